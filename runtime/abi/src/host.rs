@@ -1,0 +1,83 @@
+//! The world outside a scan: files, read in chunks by a service that `takt` implements.
+//!
+//! A request leaves in one scan; its completion is latched at the start of a later scan (in simulation: the next). No scan waits for a disk.
+
+/// Bytes that one request reads at the most.
+pub const CHUNK: usize = 256 * 1024;
+
+/// The folder of the project that a path is relative to. A path that leaves it, by name or by link, is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Folder {
+    /// `nc/`: G-code.
+    Nc,
+    /// `data/`: what programs read and write.
+    Data,
+}
+
+/// What a block asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Request {
+    /// Reads up to [`CHUNK`] bytes of a file from `offset`.
+    Read {
+        /// Where the path starts.
+        folder: Folder,
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+        /// First byte.
+        offset: u64,
+    },
+}
+
+/// Names a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Ticket(pub u64);
+
+/// Why a request failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HostError {
+    /// No such file.
+    NotFound,
+    /// The path leaves its folder, or is not a plain relative path.
+    Outside,
+    /// A folder, device or unreadable file.
+    NotReadable,
+    /// The operating system reported this error number.
+    Os(i32),
+    /// Too many requests under way; ask again in the next scan.
+    Busy,
+    /// There is no host (a test without files).
+    Absent,
+}
+
+/// What a read brought.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Chunk {
+    /// The bytes; fewer than [`CHUNK`] only at the end of the file.
+    pub data: Vec<u8>,
+    /// Size of the file in bytes.
+    pub file_size: u64,
+}
+
+/// Implemented by `takt`; also by tests.
+pub trait Host {
+    /// Queues a request; never blocks. `buffer` is given to the host and comes back as [`Chunk::data`], so that nothing is allocated in a scan.
+    fn submit(&mut self, request: Request, buffer: Vec<u8>) -> Result<Ticket, HostError>;
+    /// At the start of a scan: makes finished requests visible to [`Host::take`]. With `wait`, waits for all of them (virtual time).
+    fn latch(&mut self, wait: bool);
+    /// The completion of a request, once, if it has been latched. On an error the buffer is lost.
+    fn take(&mut self, ticket: Ticket) -> Option<Result<Chunk, HostError>>;
+}
+
+/// A host without files.
+#[derive(Debug, Default)]
+pub struct NoHost;
+
+impl Host for NoHost {
+    fn submit(&mut self, _: Request, _: Vec<u8>) -> Result<Ticket, HostError> {
+        Err(HostError::Absent)
+    }
+    fn latch(&mut self, _: bool) {}
+    fn take(&mut self, _: Ticket) -> Option<Result<Chunk, HostError>> {
+        None
+    }
+}
