@@ -1,0 +1,111 @@
+//! What is said about a user's program: data with a code and spans, rendered elsewhere.
+
+use crate::Span;
+
+/// How bad it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// The program runs.
+    Warning,
+    /// The program does not run.
+    Error,
+}
+
+/// A second place that matters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// Where.
+    pub span: Span,
+    /// What is there.
+    pub message: String,
+}
+
+/// One message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// From the table.
+    pub code: Code,
+    /// Starts lower-case, names things in backticks, says what was expected and found.
+    pub message: String,
+    /// Where.
+    pub span: Span,
+    /// Other places.
+    pub notes: Vec<Note>,
+    /// What to do.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    /// A message without notes.
+    pub fn new(code: Code, span: Span, message: impl Into<String>) -> Self {
+        Self { code, message: message.into(), span, notes: Vec::new(), help: None }
+    }
+    /// Adds a second place.
+    pub fn note(mut self, span: Span, message: impl Into<String>) -> Self {
+        self.notes.push(Note { span, message: message.into() });
+        self
+    }
+    /// Adds what to do.
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+    /// How bad it is: codes starting with W are warnings.
+    pub fn severity(&self) -> Severity {
+        if self.code.text().starts_with('W') { Severity::Warning } else { Severity::Error }
+    }
+}
+
+macro_rules! codes {
+    ($($code:ident $name:ident $text:literal,)*) => {
+        /// The kinds of messages. Each has a page `codes/<CODE>.md`.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Code { $(#[doc = $text] $name,)* }
+        impl Code {
+            /// `E0301`.
+            pub fn text(self) -> &'static str { match self { $(Self::$name => stringify!($code),)* } }
+            /// One line on what it means.
+            pub fn meaning(self) -> &'static str { match self { $(Self::$name => $text,)* } }
+        }
+        /// All codes, in order.
+        pub fn codes() -> &'static [Code] { &[$(Code::$name,)*] }
+    };
+}
+codes! {
+    E0101 UnexpectedCharacter "a character that no ST token starts with",
+    E0102 UnterminatedComment "a comment is not closed",
+    E0103 UnterminatedString "a string is not closed on its line",
+    E0104 BadLiteral "a literal is malformed or too large for any type",
+    E0105 UnexpectedToken "another word or sign was expected here",
+    E0106 TooDeep "brackets or statements are nested too deeply",
+    E0107 MissingEnd "a block is not closed by its END_",
+    E0108 NotSupported "a construct that this version does not support",
+    E0201 UnknownName "a name is used but never declared",
+    E0202 DuplicateName "a name is declared twice in one scope",
+    E0203 UnknownType "a type is used but never declared",
+    E0204 UnknownMember "a structure, block or enumeration has no such member",
+    E0205 Circular "a type or constant depends on itself",
+    E0206 NotAccessible "a variable cannot be seen from here",
+    E0301 TypeMismatch "a value has another type than its place",
+    E0302 NotAssignable "something that is not a variable is written",
+    E0303 BadOperand "an operator does not accept this type",
+    E0304 NotConstant "a constant expression was expected",
+    E0305 OutOfRange "a constant is outside the range of its type or bounds",
+    E0306 NotCallable "something that is not a function or block instance is called",
+    E0307 BadArgument "an argument does not fit the parameters",
+    E0308 MissingArgument "a needed argument is missing",
+    E0309 NotIndexable "something that is not an array is indexed, or with a wrong number of indices",
+    E0310 NotPointer "something that is not a pointer is dereferenced",
+    E0311 BadStatement "a statement stands where it has no effect or no meaning",
+    E0312 DuplicateLabel "a CASE label or jump label occurs twice",
+    E0313 DivisionByZero "a constant division by zero",
+    E0314 BadInitializer "an initial value does not fit its variable",
+    E0401 NoProgram "nothing to run: no program or task",
+    E0402 BadTask "a task or configuration is not usable",
+    E0403 TooLarge "the program needs more memory than an application may have",
+    W0301 LossyConversion "an implicit conversion may lose information",
+    W0302 ResultUnused "a value is computed and not used",
+    W0303 SharedData "two tasks use a variable and one may see it half changed",
+    W0304 NeverAssigned "a result is never assigned",
+    W0305 ConstantOverflow "a constant does not fit and is cut",
+}
