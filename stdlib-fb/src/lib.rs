@@ -1,1 +1,88 @@
-//! Placeholder.
+//! The standard function blocks: timers, counters and edges in ST, G-code, kinematics and motion in Rust.
+//!
+//! [`LIBRARY`] is all that the compiler is handed. A block that can be written in ST stands in `st/` and is compiled with every program that uses
+//! it; a block in Rust is one declaration that holds its fields, its documentation and its body. No block knows the compiler, the engine or a bus.
+
+pub mod cnc;
+pub mod motion;
+
+use takt_abi::{AxisRef, AxisState, BlockDesc, BufferMode, ControllerMode, Direction, EnumDesc, FnDesc, Library, SmcError, StructDesc};
+
+/// Everything that a program may use without declaring it.
+pub static LIBRARY: Library = Library {
+    name: "Takt",
+    blocks: &BLOCKS,
+    functions: &FUNCTIONS,
+    structs: &STRUCTS,
+    enums: &ENUMS,
+    aliases: &ALIASES,
+    sources: &[
+        ("counters.st", include_str!("../st/counters.st")),
+        ("edges.st", include_str!("../st/edges.st")),
+        ("latches.st", include_str!("../st/latches.st")),
+        ("timers.st", include_str!("../st/timers.st")),
+    ],
+};
+
+/// The types that `takt-abi` itself declares, because the engine reads them too.
+const SHARED_STRUCTS: &[&StructDesc] = &[AxisRef::DESC];
+const SHARED_ENUMS: &[&EnumDesc] = &[AxisState::DESC, Direction::DESC, BufferMode::DESC, ControllerMode::DESC, SmcError::DESC];
+const SHARED_ALIASES: &[(&str, &str)] = &[("AXIS_REF", "AXIS_REF_SM3"), ("SMC_VIRTUAL_AXIS", "AXIS_REF_SM3")];
+
+static BLOCKS: [&BlockDesc; cnc::BLOCKS.len() + motion::BLOCKS.len()] = join(&[cnc::BLOCKS, motion::BLOCKS]);
+static FUNCTIONS: [&FnDesc; cnc::FUNCTIONS.len() + motion::FUNCTIONS.len()] = join(&[cnc::FUNCTIONS, motion::FUNCTIONS]);
+static STRUCTS: [&StructDesc; SHARED_STRUCTS.len() + cnc::STRUCTS.len() + motion::STRUCTS.len()] =
+    join(&[SHARED_STRUCTS, cnc::STRUCTS, motion::STRUCTS]);
+static ENUMS: [&EnumDesc; SHARED_ENUMS.len() + cnc::ENUMS.len() + motion::ENUMS.len()] = join(&[SHARED_ENUMS, cnc::ENUMS, motion::ENUMS]);
+static ALIASES: [(&str, &str); SHARED_ALIASES.len() + cnc::ALIASES.len() + motion::ALIASES.len()] =
+    join(&[SHARED_ALIASES, cnc::ALIASES, motion::ALIASES]);
+
+/// The tables of the topics, one after the other. `N` is the sum of their lengths.
+const fn join<T: Copy, const N: usize>(parts: &[&[T]]) -> [T; N] {
+    let mut first = 0;
+    while parts[first].is_empty() {
+        first += 1;
+    }
+    let mut all = [parts[first][0]; N];
+    let (mut part, mut at) = (0, 0);
+    while part < parts.len() {
+        let mut i = 0;
+        while i < parts[part].len() {
+            all[at] = parts[part][i];
+            at += 1;
+            i += 1;
+        }
+        part += 1;
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LIBRARY;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_name_is_declared_once_and_every_alias_leads_somewhere() {
+        let mut names = BTreeSet::new();
+        let blocks = LIBRARY.blocks.iter().flat_map(|b| std::iter::once(b.name).chain(b.aliases.iter().copied()));
+        let types = LIBRARY.structs.iter().map(|s| s.name).chain(LIBRARY.enums.iter().map(|e| e.name));
+        for name in blocks.chain(types).chain(LIBRARY.functions.iter().map(|f| f.name)) {
+            assert!(names.insert(name.to_ascii_uppercase()), "{name} is declared twice");
+        }
+        for (alias, target) in LIBRARY.aliases {
+            assert!(names.contains(&target.to_ascii_uppercase()), "{alias} stands for {target}, which nobody declares");
+            assert!(names.insert(alias.to_ascii_uppercase()), "{alias} is declared twice");
+        }
+    }
+
+    #[test]
+    fn every_block_type_and_function_is_documented() {
+        for block in LIBRARY.blocks {
+            assert!(!block.doc.trim().is_empty(), "{} has no documentation", block.name);
+        }
+        for function in LIBRARY.functions {
+            assert!(!function.doc.trim().is_empty(), "{} has no documentation", function.name);
+        }
+    }
+}
