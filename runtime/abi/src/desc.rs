@@ -63,7 +63,7 @@ pub enum FieldType {
 }
 
 /// Which VAR section a field stands in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Section {
     /// VAR_INPUT.
     Input,

@@ -6,6 +6,7 @@
 
 mod inst;
 mod interp;
+mod memory;
 mod op;
 mod parse;
 mod print;
@@ -20,7 +21,7 @@ pub use interp::{Interpreter, run_body};
 pub use op::{Op, Word, ops};
 pub use parse::{ParseError, parse_program};
 pub use print::print_program;
-pub use program::{Global, Native, Program, ResourceInstance, Site, Task, Trigger, NULL_ZONE};
-pub use symbols::{format_value, parse_value, resolve, Place, SymbolError};
-pub use types::{elem_name, elem_size, Enumeration, Field, StructKind, Structure, Type, TypeId, Types};
-pub use verify::{VerifyError, verify};
+pub use program::{Global, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger};
+pub use symbols::{Place, Scalar, SymbolError, ValueError, format_value, parse_value, read_scalar, resolve};
+pub use types::{Enumeration, Field, StructKind, Structure, Type, TypeId, Types, elem_name, elem_size};
+pub use verify::{Defect, VerifyError, verify};
