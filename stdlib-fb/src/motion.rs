@@ -1,15 +1,26 @@
 //! Motion: kinematics, splines, time laws and the blocks on axes.
 //!
-//! The types of `takt-abi` (AXIS_REF_SM3 and its enumerations) are listed in `lib.rs`, not here.
+//! The mathematics stands in modules of pure functions ([`kin5`], [`spline`]), in radians where angles occur; the blocks around them speak ST:
+//! degrees, mm, seconds, PLCopen conventions. The types of `takt-abi` (AXIS_REF_SM3 and its enumerations) are listed in `lib.rs`, not here.
+
+#[cfg(test)]
+mod bench;
+pub mod kin5;
+#[cfg(test)]
+mod oracle;
+pub mod pvt;
+pub mod spline;
+pub mod transformation;
 
 use takt_abi::{BlockDesc, EnumDesc, FnDesc, StructDesc};
 
 /// The blocks of this topic.
-pub const BLOCKS: &[&BlockDesc] = &[];
+pub const BLOCKS: &[&BlockDesc] =
+    &[transformation::ForwardTransformation::DESC, transformation::InverseTransformation::DESC, pvt::Pvt::DESC];
 /// The functions of this topic.
 pub const FUNCTIONS: &[&FnDesc] = &[];
 /// The structures of this topic.
-pub const STRUCTS: &[&StructDesc] = &[];
+pub const STRUCTS: &[&StructDesc] = &[transformation::FiveAxisGeometry::DESC];
 /// The enumerations of this topic.
 pub const ENUMS: &[&EnumDesc] = &[];
 /// Other names of types: (alias, canonical).
