@@ -1,6 +1,6 @@
 //! Motion: kinematics, splines, time laws and the blocks on axes.
 //!
-//! The mathematics stands in modules of pure functions ([`kin5`], [`spline`]), in radians where angles occur; the blocks around them speak ST:
+//! The mathematics stands in modules of pure functions ([`kin5`], [`spline`], [`profile`], [`path_law`]), in radians where angles occur; the blocks around them speak ST:
 //! degrees, mm, seconds, PLCopen conventions. The types of `takt-abi` (AXIS_REF_SM3 and its enumerations) are listed in `lib.rs`, not here.
 
 #[cfg(test)]
@@ -8,6 +8,8 @@ mod bench;
 pub mod kin5;
 #[cfg(test)]
 mod oracle;
+pub mod path_law;
+pub mod profile;
 pub mod pvt;
 pub mod spline;
 pub mod transformation;
@@ -18,9 +20,15 @@ use takt_abi::{BlockDesc, EnumDesc, FnDesc, StructDesc};
 pub const BLOCKS: &[&BlockDesc] =
     &[transformation::ForwardTransformation::DESC, transformation::InverseTransformation::DESC, pvt::Pvt::DESC];
 /// The functions of this topic.
-pub const FUNCTIONS: &[&FnDesc] = &[];
+pub const FUNCTIONS: &[&FnDesc] = &[
+    path_law::SCurveTime::DESC,
+    path_law::SCurvePos::DESC,
+    path_law::SCurveVel::DESC,
+    path_law::SCurveAcc::DESC,
+    path_law::SCurveTimeAt::DESC,
+];
 /// The structures of this topic.
-pub const STRUCTS: &[&StructDesc] = &[transformation::FiveAxisGeometry::DESC];
+pub const STRUCTS: &[&StructDesc] = &[transformation::FiveAxisGeometry::DESC, profile::Profile::DESC];
 /// The enumerations of this topic.
 pub const ENUMS: &[&EnumDesc] = &[];
 /// Other names of types: (alias, canonical).
