@@ -4,8 +4,10 @@
 //! has accepted it. **Invariant:** a verified body reaches memory only through an address whose extent is known, so that no program can touch
 //! anything but its own image.
 
+mod calendar;
 mod inst;
 mod interp;
+mod literal;
 mod memory;
 mod op;
 mod parse;
@@ -14,14 +16,17 @@ mod program;
 mod symbols;
 pub mod text;
 mod types;
+mod value;
 mod verify;
 
 pub use inst::{Base, Block, BlockId, Body, BodyId, Const, Inst, Local, Mem, NativeId, SiteId, Term, Ty};
 pub use interp::{Interpreter, run_body};
+pub use literal::{ValueError, parse_value};
 pub use op::{Op, Word, ops};
 pub use parse::{ParseError, parse_program};
 pub use print::print_program;
 pub use program::{Global, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger};
-pub use symbols::{Place, Scalar, SymbolError, ValueError, format_value, parse_value, read_scalar, resolve};
+pub use symbols::{Place, SymbolError, resolve};
 pub use types::{Enumeration, Field, StructKind, Structure, Type, TypeId, Types, elem_name, elem_size};
+pub use value::{Scalar, format_value, read_scalar};
 pub use verify::{Defect, VerifyError, verify};

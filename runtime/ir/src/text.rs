@@ -32,7 +32,7 @@ fn compare(cx: &mut Cx<'_>, a: u64, a_cap: u32, b: u64, b_cap: u32, unit: usize)
     *cx.fuel = cx.fuel.saturating_sub(a_len.min(b_len) as i64 / FUEL_BYTES);
     let (a, b) = (cx.bytes(a, a_len)?, cx.bytes(b, b_len)?);
     // The high byte of a little-endian unit decides first.
-    let order = a.chunks_exact(unit).map(|c| c.iter().rev()).flatten().cmp(b.chunks_exact(unit).map(|c| c.iter().rev()).flatten());
+    let order = a.chunks_exact(unit).flat_map(|c| c.iter().rev()).cmp(b.chunks_exact(unit).flat_map(|c| c.iter().rev()));
     Ok(order as i64)
 }
 
