@@ -1,0 +1,274 @@
+//! The engine as others hold it: steps, snapshots out, commands in. Everything here happens between scans.
+
+use crate::axis::stage::AxisStatus;
+use crate::bus::{IoFault, ProcessImage};
+use crate::core::{Core, Force};
+use crate::executor::Executor;
+use crate::fault::{FaultRecord, RawFault};
+use crate::memory::execute;
+use crate::options::Preemption;
+use crate::statistics::TaskStatistics;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use takt_abi::{Fault, Time};
+use takt_ir::{Base, BodyId, Inst, Place, Program};
+
+/// Fuel of a condition.
+const CONDITION_FUEL: i64 = 100_000;
+
+/// Why a command or a look into the image was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AccessError {
+    /// The place lies outside the image.
+    Outside,
+    /// The value has another size than the variable.
+    Size {
+        /// Bytes of the variable.
+        expected: usize,
+        /// Bytes given.
+        found: usize,
+    },
+}
+
+impl std::fmt::Display for AccessError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Outside => write!(f, "the variable lies outside the program's memory"),
+            Self::Size { expected, found } => write!(f, "the variable has {expected} bytes, the value {found}"),
+        }
+    }
+}
+impl std::error::Error for AccessError {}
+
+/// Stops a scan from another thread or a signal handler: at its next poll it ends with [`Fault::Stopped`].
+#[derive(Debug, Clone)]
+pub struct StopHandle(Arc<AtomicBool>);
+
+impl StopHandle {
+    /// Asks for the stop. It is also remembered when no scan is running: see [`Engine::step`].
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A loaded program.
+pub struct Engine {
+    core: Box<Core>,
+    /// Copy of the image for conditions that might change it.
+    scratch: Vec<u8>,
+}
+
+impl std::fmt::Debug for Engine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Engine").field("now", &self.core.now).field("cycles", &self.cycles()).finish_non_exhaustive()
+    }
+}
+
+impl Engine {
+    pub(crate) fn new(core: Box<Core>) -> Self {
+        Self { core, scratch: Vec::new() }
+    }
+
+    /// Runs the tasks that are due at `now`, the most important first, with a bus cycle around the bus task.
+    ///
+    /// `now` never goes back. In virtual time pass [`Engine::next_release`]; the first call sets the phase of all cyclic tasks. After a fault only axis
+    /// stage and bus go on. A stop that was asked for is obeyed here.
+    pub fn step(&mut self, now: Time) {
+        if self.core.stop.load(Ordering::Relaxed) {
+            self.halt();
+        }
+        let now = now.max(self.core.now);
+        self.core.step(now);
+        if self.core.stop.swap(false, Ordering::Relaxed) {
+            self.halt();
+        }
+    }
+
+    /// When the next task is due by time: what to pass to [`Engine::step`] next. After a fault: the next bus cycle.
+    pub fn next_release(&self) -> Time {
+        let core = &self.core;
+        let all = core.tasks.iter().enumerate().filter(|(i, _)| core.fault.is_none() || *i == core.bus);
+        all.filter_map(|(_, t)| t.next_release()).min().unwrap_or(Time(core.now.0 + core.tasks[core.bus].period.0))
+    }
+
+    /// Time of the last step.
+    pub fn now(&self) -> Time {
+        self.core.now
+    }
+
+    /// The program.
+    pub fn program(&self) -> &Program {
+        &self.core.program
+    }
+
+    /// Index of the task that owns the bus.
+    pub fn bus_task(&self) -> usize {
+        self.core.bus
+    }
+
+    /// Period of a bus cycle.
+    pub fn bus_period(&self) -> Time {
+        self.core.tasks[self.core.bus].period
+    }
+
+    /// Bus cycles so far, those after a fault included.
+    pub fn cycles(&self) -> u64 {
+        self.core.tasks[self.core.bus].statistics.cycles
+    }
+
+    /// What is known of the scans of a task (index into [`Program::tasks`]).
+    ///
+    /// # Panics
+    /// If there is no such task.
+    pub fn statistics(&self, task: usize) -> &TaskStatistics {
+        &self.core.tasks[task].statistics
+    }
+
+    /// Where tasks were interrupted under a real clock, in order (the first 65 536).
+    pub fn preemptions(&self) -> &[Preemption] {
+        &self.core.recorded
+    }
+
+    /// The fault that stopped the application.
+    pub fn fault(&self) -> Option<&FaultRecord> {
+        let raw = self.core.fault.as_ref()?;
+        Some(self.core.record.get_or_init(|| raw.record(&self.core.program)))
+    }
+
+    /// Stops the application as a fault does, with [`Fault::Stopped`]: axes are brought to rest, outputs go to their safe values.
+    pub fn halt(&mut self) {
+        let core = &mut self.core;
+        let raw = RawFault {
+            fault: Fault::Stopped,
+            site: u32::MAX,
+            trace: [0; takt_abi::TRACE_DEPTH],
+            trace_len: 0,
+            task: Some(core.bus),
+            time: core.now,
+            cycle: core.tasks[core.bus].statistics.cycles,
+        };
+        core.stop_application(raw);
+    }
+
+    /// For another thread or a signal handler.
+    pub fn stop_handle(&self) -> StopHandle {
+        StopHandle(self.core.stop.clone())
+    }
+
+    /// Warm restart: clears the fault and starts the program with its initial values. Axes keep their reference. On an error the fault stays.
+    pub fn reset(&mut self) -> Result<(), Box<FaultRecord>> {
+        let core = &mut self.core;
+        core.initialise()?;
+        core.fault = None;
+        core.stop.store(false, Ordering::Relaxed);
+        let release = core.tasks[core.bus].release;
+        for task in &mut core.tasks {
+            task.release = release;
+        }
+        Ok(())
+    }
+
+    /// Whether all axes stand still with their drives off.
+    pub fn at_rest(&self) -> bool {
+        self.core.stage.at_rest()
+    }
+
+    /// The axes, in the order of [`crate::Options::axes`].
+    pub fn axes(&self) -> impl ExactSizeIterator<Item = AxisStatus> {
+        self.core.stage.status()
+    }
+
+    /// What went over the bus last.
+    pub fn process_image(&self) -> &ProcessImage {
+        &self.core.io
+    }
+
+    /// Why the last exchange failed, if it did, and how many have.
+    pub fn io_faults(&self) -> (Option<IoFault>, u64) {
+        (self.core.io_fault, self.core.io_faults)
+    }
+
+    /// The whole image.
+    pub fn image(&self) -> &[u8] {
+        self.core.image.bytes()
+    }
+
+    fn range(&self, place: Place) -> Result<std::ops::Range<usize>, AccessError> {
+        let types = &self.core.program.types;
+        if place.ty.0 as usize >= types.all().len() {
+            return Err(AccessError::Outside);
+        }
+        let start = place.offset as usize;
+        let end = start + types.size(place.ty) as usize;
+        if end > self.image().len() { Err(AccessError::Outside) } else { Ok(start..end) }
+    }
+
+    /// The bytes of a variable (see [`takt_ir::resolve`]); empty if the place is not of this program.
+    pub fn read(&self, place: Place) -> &[u8] {
+        self.range(place).map_or(&[], |range| &self.image()[range])
+    }
+
+    /// Writes a variable once.
+    pub fn write(&mut self, place: Place, bytes: &[u8]) -> Result<(), AccessError> {
+        let range = self.range(place)?;
+        if range.len() != bytes.len() {
+            return Err(AccessError::Size { expected: range.len(), found: bytes.len() });
+        }
+        self.core.image.bytes_mut()[range].copy_from_slice(bytes);
+        Ok(())
+    }
+
+    /// Holds a variable at a value: written before and after the programs of each scan, until [`Engine::unforce`].
+    pub fn force(&mut self, place: Place, bytes: &[u8]) -> Result<(), AccessError> {
+        self.write(place, bytes)?;
+        match self.core.forces.iter_mut().find(|f| f.place == place) {
+            Some(force) => force.bytes.copy_from_slice(bytes),
+            None => self.core.forces.push(Force { place, bytes: bytes.to_vec() }),
+        }
+        Ok(())
+    }
+
+    /// Lets a variable go; false if it was not forced.
+    pub fn unforce(&mut self, place: Place) -> bool {
+        let before = self.core.forces.len();
+        self.core.forces.retain(|f| f.place != place);
+        self.core.forces.len() < before
+    }
+
+    /// The forced variables and their values, in the order they were forced.
+    pub fn forces(&self) -> impl ExactSizeIterator<Item = (Place, &[u8])> {
+        self.core.forces.iter().map(|f| (f.place, f.bytes.as_slice()))
+    }
+
+    /// Runs a body without parameters in the interpreter and returns its result (a condition: 0 or 1). What it changes in the image is undone.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn evaluate(&mut self, body: BodyId) -> Result<u64, Fault> {
+        let changes = changes_image(&self.core.program, body);
+        if changes {
+            self.scratch.clear();
+            self.scratch.extend_from_slice(self.core.image.bytes());
+        }
+        let core = self.core.as_mut();
+        let (start, size) = core.tasks[core.bus].stack;
+        core.spare.get_mut().prepare(CONDITION_FUEL, u64::from(start) + u64::from(size));
+        let fault = execute(core, |core, _| &mut core.spare, 0, &Executor::Interpreter, body, start.into());
+        let result = core.spare.get().interpreter.result();
+        if changes {
+            core.image.bytes_mut().copy_from_slice(&self.scratch);
+        }
+        fault.map_or(Ok(result), Err)
+    }
+}
+
+/// Whether a body might write something that is not its own frame.
+fn changes_image(program: &Program, body: BodyId) -> bool {
+    let own = |base: &Base| matches!(base, Base::Frame);
+    program.bodies[body.0 as usize].blocks.iter().flat_map(|b| &b.insts).any(|inst| match inst {
+        Inst::Store { base, .. } => !own(base),
+        Inst::Move { dst, .. } | Inst::Data { dst, .. } => !own(dst),
+        Inst::Call { .. } | Inst::Native { .. } => true,
+        _ => false,
+    })
+}

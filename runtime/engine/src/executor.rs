@@ -1,0 +1,8 @@
+//! The two ways to run a program.
+
+/// How bodies are run. Cheap to clone: a clone is held while a body runs.
+#[derive(Clone)]
+pub(crate) enum Executor {
+    /// The reference interpreter.
+    Interpreter,
+}
