@@ -11,6 +11,8 @@ use takt_abi::{Bool, Cx, Fault, Handle, Plain, Ptr, SmcError, Str, function_bloc
 
 /// Lines that one call decodes at the most.
 const LINES: u32 = 64;
+/// A call begins no line after so many bytes: comments cost time too.
+const BYTES: usize = 2 * 1024;
 /// Elements that the buffer must hold.
 const LEAST: u64 = 5;
 
@@ -18,9 +20,13 @@ function_block! {
     /// Decodes G-code into path elements (SMC_GEOINFO) in a queue whose buffer belongs to the program.
     ///
     /// The rising edge of `bExecute` starts with an empty queue at `piStartPosition`; from then on call the block in every scan of a slow task, behind the
-    /// ReadNCFile whose `sentences` it is given. A call decodes at most 64 lines (about 20 µs); it may be called more than once in a scan. It waits when the
+    /// ReadNCFile whose `sentences` it is given. A call decodes at most 64 lines or 2 KiB (less than 20 µs); it may be called more than once in a scan. It waits when the
     /// queue is full and goes on when there is room. `poqDataOut` is the queue: take elements out with SMC_GetObj and SMC_DeleteObj. At the end of the file, or
     /// at M2 or M30, `bDone` and `poqDataOut^.bEndOfList` become TRUE. An error ends the work: elements decoded before it stay in the queue, `bEndOfList` stays FALSE.
+    ///
+    /// Words: N, X Y Z A B C P Q U V W, I J K R, F FF E EF, T, M. G0 G1 G2 G3 (arcs and helices in the plane of G17 G18 G19, centre by I J K as G98 or G99 says, or R),
+    /// G4 T (s), G90 G91, G92. G54 sets the coordinate system (shift by the axis words, scale by I J K; A B C turn it unless `eOriConv` is ADDAXES, which shifts them),
+    /// G55 changes it in its own coordinates, G56 moves it so that the tool has the given coordinates, G53 resets it.
     ///
     /// M functions are elements of type MCOMMAND with `iM_No`; those of a block act before its move, except M0, M1 and M60. A move that goes nowhere makes no element. G92 makes
     /// none either: the next element starts where G92 says, so the path jumps unless the tool is there.
@@ -182,11 +188,10 @@ impl NcInterpreter {
     fn lines(&mut self, cx: &mut Cx<'_>, source: &mut NcSource) -> Result<(), Fault> {
         let settings = *source.settings();
         let (mut words, mut elements) = (Words::default(), Elements::default());
-        for _ in 0..LINES {
-            if self.Queue.is_full() {
-                break;
-            }
-            match self.line(source, &settings, &mut words, &mut elements) {
+        let (mut budget, mut lines) = (BYTES, LINES);
+        while lines > 0 && budget > 0 && !self.Queue.is_full() {
+            lines -= 1;
+            match self.line(source, &settings, &mut words, &mut elements, &mut budget) {
                 Ok(None) => {}
                 Ok(Some(Stop::Wait)) => break,
                 Ok(Some(Stop::Failed(trouble))) | Err(trouble) => {
@@ -215,6 +220,7 @@ impl NcInterpreter {
         settings: &Settings,
         words: &mut Words,
         elements: &mut Elements,
+        budget: &mut usize,
     ) -> Result<Option<Stop>, Trouble> {
         elements.clear();
         let (number, text) = match source.next_line() {
@@ -224,6 +230,7 @@ impl NcInterpreter {
             Next::End if self.Modal.bComment.get() => return Err(Kind::CommentOpen.at(source.line(), 0)),
             Next::End => return Ok(Some(Stop::End)),
         };
+        *budget = budget.saturating_sub(text.len());
         if !self.begun.get() {
             self.begin(settings);
         }

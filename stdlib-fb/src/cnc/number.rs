@@ -14,28 +14,18 @@ const TENS: [f64; 16] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10,
 pub fn read(line: &[u8], at: usize) -> Result<(f64, usize), Kind> {
     let negative = matches!(line.get(at), Some(b'-'));
     let digits_at = at + usize::from(matches!(line.get(at), Some(b'-' | b'+')));
-    let (mut i, mut mantissa, mut count, mut fraction) = (digits_at, 0u64, 0usize, 0usize);
-    while let Some(d) = digit(line, i) {
-        mantissa = mantissa.wrapping_mul(10).wrapping_add(d);
-        count += usize::from(mantissa != 0);
-        i += 1;
-    }
-    let mut seen = i - digits_at;
+    let (mut mantissa, mut i) = digits(line, digits_at, 0);
+    let (mut seen, mut fraction) = (i - digits_at, 0);
     if line.get(i) == Some(&b'.') {
-        i += 1;
-        let start = i;
-        while let Some(d) = digit(line, i) {
-            mantissa = mantissa.wrapping_mul(10).wrapping_add(d);
-            count += usize::from(mantissa != 0);
-            i += 1;
-        }
+        let start = i + 1;
+        (mantissa, i) = digits(line, start, mantissa);
         fraction = i - start;
         seen += fraction;
     }
     if seen == 0 {
         return Err(not_a_number(&line[at..]));
     }
-    let value = if count <= 15 && fraction <= 15 { mantissa as f64 / TENS[fraction] } else { slow(&line[digits_at..i])? };
+    let value = if seen <= 15 { mantissa as f64 / TENS[fraction] } else { slow(&line[digits_at..i])? };
     if matches!(line.get(i), Some(b'e' | b'E')) && exponent_follows(line, i + 1) {
         return Err(if exponent(line, i + 1, value) { Kind::OutOfRange } else { Kind::Exponent });
     }
@@ -46,6 +36,16 @@ pub fn read(line: &[u8], at: usize) -> Result<(f64, usize), Kind> {
         return Err(Kind::NumberInvalid);
     }
     Ok((if negative { -value } else { value }, i))
+}
+
+/// Goes on with `mantissa` over the digits at `i`; it wraps where there are too many.
+#[inline]
+fn digits(line: &[u8], mut i: usize, mut mantissa: u64) -> (u64, usize) {
+    while let Some(d) = digit(line, i) {
+        mantissa = mantissa.wrapping_mul(10).wrapping_add(d);
+        i += 1;
+    }
+    (mantissa, i)
 }
 
 #[inline]

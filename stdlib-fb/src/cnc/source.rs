@@ -218,7 +218,7 @@ impl NcSource {
 
     fn receive(&mut self, chunk: Chunk) {
         let size = *self.file_size.get_or_insert(chunk.file_size);
-        let received = self.received + chunk.data.len() as u64;
+        let received = self.received.saturating_add(chunk.data.len() as u64);
         let short = chunk.data.len() < CHUNK && received < size;
         if size == 0 {
             return self.fail(Kind::Empty.at(0, 0));
@@ -256,10 +256,12 @@ impl NcSource {
             return;
         }
         let end = self.front.len().min(self.watched + WATCH);
-        if let Some(i) = self.front[self.watched..end].iter().position(|b| *b == 0) {
-            let passed = self.front.get(self.at..self.watched + i).unwrap_or(&[]);
-            let line = self.line + 1 + passed.iter().filter(|b| **b == b'\n').count() as u32;
-            self.fail(Kind::NotText.at(line, 0));
+        let fresh = &self.front[self.watched..end];
+        if fresh.contains(&0) {
+            let nul = self.watched + fresh.iter().position(|b| *b == 0).unwrap_or(0);
+            let passed = self.front.get(self.at..nul).unwrap_or(&[]);
+            let breaks = passed.iter().filter(|b| **b == b'\n').count() as u32;
+            self.fail(Kind::NotText.at(self.line.saturating_add(1).saturating_add(breaks), 0));
         }
         self.watched = end;
     }
@@ -281,7 +283,7 @@ impl NcSource {
                 let reach = rest.len().min(LINE_MAX + 1 - self.carry.len().min(LINE_MAX));
                 let Some(length) = rest[..reach].iter().position(|b| *b == b'\n') else {
                     if reach < rest.len() || self.carry.len() + reach > LINE_MAX {
-                        self.fail(Kind::LineTooLong.at(self.line + 1, 0));
+                        self.fail(Kind::LineTooLong.at(self.line.saturating_add(1), 0));
                         continue;
                     }
                     self.carry.extend_from_slice(rest);
@@ -291,7 +293,7 @@ impl NcSource {
                 let start = self.at;
                 self.at += length + 1;
                 if self.carry.is_empty() {
-                    self.line += 1;
+                    self.line = self.line.saturating_add(1);
                     return Next::Line(self.line, without_mark(self.line, &self.front[start..start + length]));
                 }
                 self.carry.extend_from_slice(&self.front[start..start + length]);
@@ -313,7 +315,7 @@ impl NcSource {
 
     fn carried(&mut self) -> Next<'_> {
         self.handed = true;
-        self.line += 1;
+        self.line = self.line.saturating_add(1);
         Next::Line(self.line, without_mark(self.line, &self.carry))
     }
 }

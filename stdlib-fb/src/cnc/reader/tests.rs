@@ -285,6 +285,23 @@ fn a_full_queue_holds_the_interpreter_back() {
 }
 
 #[test]
+fn a_call_is_bounded_by_lines_and_by_bytes() {
+    let mut rig = job("G1 X1\nX2\n".repeat(1000));
+    rig.scan();
+    rig.scan();
+    assert_eq!(rig.interpreter.iLineNumberDecoded, 47, "the queue is full");
+    rig.consume(|_| ());
+    let mut rig = job(format!("({})\n", "a".repeat(2000)).repeat(100));
+    rig.scan();
+    rig.scan();
+    assert_eq!(rig.interpreter.iLineNumberDecoded, 1, "two lines of 2002 bytes");
+    let mut rig = job("\n".repeat(1000));
+    rig.scan();
+    rig.scan();
+    assert_eq!(rig.interpreter.iLineNumberDecoded, 63);
+}
+
+#[test]
 fn files_follow_each_other_with_append() {
     let mut files = Files::with("job.cnc", "G1 X1 F5\nX2");
     files.files.insert("b.cnc".into(), Content::Bytes(b"X3\nX4".to_vec()));
