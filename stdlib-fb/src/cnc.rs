@@ -56,4 +56,4 @@ pub const STRUCTS: &[&StructDesc] = &[
 /// The enumerations of this topic.
 pub const ENUMS: &[&EnumDesc] = &[types::MoveType::DESC, types::OriConvention::DESC, types::DecoderStatus::DESC, types::Language::DESC];
 /// Other names of types: (alias, canonical).
-pub const ALIASES: &[(&str, &str)] = &[("SMC_VECTOR", "SMC_VECTOR3D")];
+pub const ALIASES: &[(&str, &str)] = &[];
