@@ -7,7 +7,7 @@
 //! limit and one unit of fuel (only in a recursive cycle). All three are at the body's declaration. [`Fault::StackOverflow`] reports the depth
 //! before the refused entry.
 
-use crate::inst::{Base, BlockId, Body, BodyId, Const, Inst, Local, NativeId, SiteId, Term, Ty};
+use crate::inst::{Base, BlockId, Body, BodyId, Const, Inst, Local, Mem, NativeId, SiteId, Term, Ty};
 use crate::memory::{self, NATIVE_WORDS};
 use crate::op::Op;
 use crate::program::{NULL_ZONE, Program};
@@ -279,7 +279,12 @@ impl<'a> Run<'a> {
     fn native(&mut self, native: NativeId, args: &[Local], dst: Option<Local>, site: SiteId) -> Result<(), u32> {
         let mut words = [0; NATIVE_WORDS];
         for (word, arg) in words[..NATIVE_WORDS - 1].iter_mut().zip(args) {
-            *word = self.get(*arg);
+            // The processor's NaNs have bits of their own; a native function must not see them.
+            *word = match self.body.locals[arg.0 as usize] {
+                Ty::F32 => memory::canonical(Mem::F32, self.get(*arg)),
+                Ty::F64 => memory::canonical(Mem::F64, self.get(*arg)),
+                Ty::I64 | Ty::Addr(_) => self.get(*arg),
+            };
         }
         let call = self.program.natives[native.0 as usize].call;
         let code = memory::call_native(self.ctx, call, &mut words);

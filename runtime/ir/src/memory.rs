@@ -65,7 +65,7 @@ pub(crate) fn store(ctx: &mut Context, mem: Mem, offset: u64, word: u64) -> Resu
 }
 
 /// The word with any NaN made the canonical one, if `mem` is a float.
-fn canonical(mem: Mem, word: u64) -> u64 {
+pub(crate) fn canonical(mem: Mem, word: u64) -> u64 {
     match mem {
         Mem::F32 if f32::from_bits(word as u32).is_nan() => 0x7FC0_0000,
         Mem::F64 if f64::from_bits(word).is_nan() => 0x7FF8_0000_0000_0000,
