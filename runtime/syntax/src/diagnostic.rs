@@ -66,6 +66,10 @@ macro_rules! codes {
             pub fn text(self) -> &'static str { match self { $(Self::$name => stringify!($code),)* } }
             /// One line on what it means.
             pub fn meaning(self) -> &'static str { match self { $(Self::$name => $text,)* } }
+            /// Its page: what it means, why, a wrong and a right example. Markdown.
+            pub fn page(self) -> &'static str {
+                match self { $(Self::$name => include_str!(concat!("../codes/", stringify!($code), ".md")),)* }
+            }
         }
         /// All codes, in order.
         pub fn codes() -> &'static [Code] { &[$(Code::$name,)*] }
@@ -108,4 +112,9 @@ codes! {
     W0303 SharedData "two tasks use a variable and one may see it half changed",
     W0304 NeverAssigned "a result is never assigned",
     W0305 ConstantOverflow "a constant does not fit and is cut",
+}
+
+/// The page of a code such as `E0301`, in any case of its letter; `None` if there is no such code.
+pub fn explain(code: &str) -> Option<&'static str> {
+    codes().iter().find(|known| known.text().eq_ignore_ascii_case(code)).map(|known| known.page())
 }

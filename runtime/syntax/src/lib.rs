@@ -5,10 +5,12 @@
 
 mod diagnostic;
 mod lexer;
+mod lines;
 mod parser;
 pub mod tree;
 
-pub use diagnostic::{codes, Code, Diagnostic, Note, Severity};
+pub use diagnostic::{Code, Diagnostic, Note, Severity, codes, explain};
+pub use lines::LineIndex;
 pub use parser::{parse, parse_expression};
 
 /// Names a source file: index into the list that the caller keeps.

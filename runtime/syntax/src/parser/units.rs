@@ -1,0 +1,243 @@
+//! What stands at the top of a file.
+
+use super::{Parser, is_end, is_var};
+use crate::lexer::{Kind, Token};
+use crate::tree::{self, Access, Globals, Interface, Modifiers, Name, Pou, PouKind, Unit};
+use crate::{Code, Diagnostic};
+
+impl Parser<'_> {
+    /// The whole file.
+    pub(super) fn file(&mut self) -> tree::File {
+        let mut file = tree::File::default();
+        while self.kind() != Kind::Eof {
+            let before = self.at;
+            self.unit(&mut file.units);
+            self.failed = false;
+            self.open.clear();
+            if self.at == before {
+                self.bump();
+            }
+        }
+        file
+    }
+
+    fn unit(&mut self, units: &mut Vec<Unit>) {
+        match self.kind() {
+            Kind::Function => units.push(Unit::Pou(self.pou(PouKind::Function, Kind::EndFunction))),
+            Kind::FunctionBlock => units.push(Unit::Pou(self.pou(PouKind::FunctionBlock, Kind::EndFunctionBlock))),
+            Kind::Program => units.push(Unit::Pou(self.pou(PouKind::Program, Kind::EndProgram))),
+            Kind::Type => units.extend(self.type_block().into_iter().map(Unit::Type)),
+            Kind::VarGlobal | Kind::VarConfig => {
+                let pragmas = self.pragmas(self.at);
+                units.extend(self.var_block().map(|vars| Unit::Globals(Globals { pragmas, vars })));
+            }
+            Kind::Configuration => units.push(Unit::Configuration(self.configuration())),
+            Kind::Class if self.starts_soft_unit() => units.push(Unit::Pou(self.pou(PouKind::FunctionBlock, Kind::EndClass))),
+            Kind::Interface if self.starts_soft_unit() => units.push(Unit::Interface(self.interface())),
+            Kind::Namespace | Kind::Using if self.starts_soft_unit() => self.namespace(),
+            Kind::Method | Kind::Property | Kind::Action if self.starts_member() => self.member_behind(units),
+            Kind::EndNamespace | Kind::Semi => {
+                self.bump();
+            }
+            _ => self.homeless(),
+        }
+    }
+
+    /// NAMESPACE and USING: the units inside are read as if it were not there.
+    fn namespace(&mut self) {
+        let word = self.bump();
+        let message = format!("`{}` is not supported", word.kind.text());
+        self.tell(Diagnostic::new(Code::NotSupported, self.span_of(word), message));
+        self.qualified_name("a name");
+        self.eat(Kind::Semi);
+    }
+
+    /// A METHOD, PROPERTY or ACTION behind the END_ of its block.
+    fn member_behind(&mut self, units: &mut [Unit]) {
+        let word = self.token();
+        if let Some(Unit::Pou(pou)) = units.last_mut() {
+            return self.member_of(pou);
+        }
+        let message = format!("`{}` belongs to no program unit", word.kind.text());
+        let help = "it stands inside of its FUNCTION_BLOCK or PROGRAM or directly behind it";
+        self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(word), message).help(help));
+        let mut nobody = self.empty_pou(PouKind::FunctionBlock, word);
+        self.member_of(&mut nobody);
+    }
+
+    fn empty_pou(&self, kind: PouKind, start: Token) -> Pou {
+        let span = self.span_of(start);
+        Pou {
+            kind,
+            name: Name { text: String::new(), span },
+            modifiers: Modifiers::default(),
+            extends: None,
+            implements: Vec::new(),
+            result: None,
+            vars: Vec::new(),
+            body: Vec::new(),
+            methods: Vec::new(),
+            properties: Vec::new(),
+            actions: Vec::new(),
+            pragmas: Vec::new(),
+            doc: None,
+            span,
+            end: span,
+        }
+    }
+
+    /// Something that is no unit: one message, and on to the next unit.
+    fn homeless(&mut self) {
+        let token = self.token();
+        let found = self.describe(token);
+        let diagnostic = Diagnostic::new(Code::UnexpectedToken, self.span_of(token), String::new());
+        let (message, help) = if is_end(token.kind) {
+            (format!("{found} belongs to no open unit"), None)
+        } else if is_var(token.kind) {
+            let help = "variables are declared in a PROGRAM, FUNCTION_BLOCK or FUNCTION; global ones in VAR_GLOBAL";
+            (format!("expected a program unit, found {found}"), Some(help))
+        } else {
+            let help = "statements stand in a unit: `PROGRAM main … END_PROGRAM`";
+            (format!("expected a program unit such as PROGRAM or TYPE, found {found}"), Some(help))
+        };
+        if !self.is_known_trouble() {
+            self.tell(Diagnostic { message, help: help.map(str::to_owned), ..diagnostic });
+        }
+        self.bump();
+        while !self.starts_unit() {
+            self.bump();
+        }
+        self.brackets = 0;
+    }
+
+    fn starts_unit(&self) -> bool {
+        use Kind::*;
+        match self.kind() {
+            Eof | Function | FunctionBlock | Program | Type | VarGlobal | VarConfig | Configuration => true,
+            _ => self.starts_soft_unit() || self.starts_member(),
+        }
+    }
+
+    /// FUNCTION, FUNCTION_BLOCK, PROGRAM or CLASS.
+    fn pou(&mut self, kind: PouKind, end: Kind) -> Pou {
+        let index = self.at;
+        let start = self.bump();
+        self.open_block(start, end);
+        let mut pou = self.empty_pou(kind, start);
+        pou.pragmas = self.pragmas(index);
+        pou.doc = self.doc_before(index);
+        pou.modifiers = self.modifiers();
+        pou.name = self.name("the name of the unit");
+        if self.kind() == Kind::Extends && !self.failed {
+            self.bump();
+            pou.extends = Some(self.qualified_name("the name of a block"));
+        }
+        if self.kind() == Kind::Implements && !self.failed {
+            self.bump();
+            pou.implements = self.name_list();
+        }
+        if self.eat(Kind::Colon) {
+            pou.result = Some(self.type_expr());
+        }
+        self.end_header();
+        self.pou_contents(&mut pou);
+        pou.end = self.end_of_block();
+        pou.span = self.span_from(start.start);
+        pou
+    }
+
+    fn pou_contents(&mut self, pou: &mut Pou) {
+        pou.vars = self.var_blocks();
+        loop {
+            let body = self.statements();
+            pou.body.extend(body);
+            pou.vars.append(&mut self.late_vars);
+            if !self.starts_member() {
+                return;
+            }
+            self.member_of(pou);
+        }
+    }
+
+    /// Closes the innermost block; the place of its END_, or where it is missing.
+    pub(super) fn end_of_block(&mut self) -> crate::Span {
+        let taken = self.at;
+        let token = self.close_block();
+        if self.at > taken { self.span_of(token) } else { self.gap() }
+    }
+
+    /// Ends the first line of a unit or member; nothing but a `;` may follow on it.
+    pub(super) fn end_header(&mut self) {
+        self.eat(Kind::Semi);
+        let next = self.token();
+        if !self.failed && !next.starts_line && !next.kind.is_reserved() && next.kind != Kind::Eof && !self.starts_statement() && !self.is_call_ahead() {
+            self.unexpected_here("a new line behind the head of the unit");
+        }
+        if self.failed {
+            while !self.token().starts_line && !self.starts_unit() && !is_var(self.kind()) && !is_end(self.kind()) {
+                self.bump();
+            }
+            self.failed = false;
+            self.brackets = 0;
+        }
+    }
+
+    fn is_call_ahead(&self) -> bool {
+        self.kind().is_name() && matches!(self.peek(1).kind, Kind::LParen | Kind::Dot)
+    }
+
+    pub(super) fn name_list(&mut self) -> Vec<Name> {
+        let mut names = vec![self.qualified_name("a name")];
+        while self.eat(Kind::Comma) {
+            names.push(self.qualified_name("a name"));
+        }
+        names
+    }
+
+    /// ABSTRACT, FINAL, OVERRIDE and access, in any order, in front of a name.
+    pub(super) fn modifiers(&mut self) -> Modifiers {
+        let mut modifiers = Modifiers::default();
+        while self.peek(1).kind.is_name() && !matches!(self.peek(1).kind, Kind::Extends | Kind::Implements) {
+            match self.kind() {
+                Kind::Abstract => modifiers.is_abstract = true,
+                Kind::Final => modifiers.is_final = true,
+                Kind::Override => modifiers.is_override = true,
+                Kind::Public => modifiers.access = Access::Public,
+                Kind::Private => modifiers.access = Access::Private,
+                Kind::Protected => modifiers.access = Access::Protected,
+                Kind::Internal => modifiers.access = Access::Internal,
+                _ => break,
+            }
+            self.bump();
+        }
+        modifiers
+    }
+
+    fn interface(&mut self) -> Interface {
+        let start = self.bump();
+        self.open_block(start, Kind::EndInterface);
+        self.modifiers();
+        let name = self.name("the name of the interface");
+        let extends = if self.kind() == Kind::Extends && !self.failed {
+            self.bump();
+            self.name_list()
+        } else {
+            Vec::new()
+        };
+        self.end_header();
+        let mut holder = self.empty_pou(PouKind::FunctionBlock, start);
+        while self.starts_member() && self.kind() != Kind::Action {
+            self.member_of(&mut holder);
+        }
+        if !is_end(self.kind()) && !self.starts_unit() {
+            self.tell(self.unexpected("`METHOD`, `PROPERTY` or `END_INTERFACE`"));
+            while !is_end(self.kind()) && !self.starts_unit() {
+                self.bump();
+            }
+        }
+        self.end_of_block();
+        let span = self.span_from(start.start);
+        Interface { name, extends, methods: holder.methods, properties: holder.properties, span }
+    }
+}
+
