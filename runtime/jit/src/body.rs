@@ -1,0 +1,348 @@
+//! One body of the IR to one function of Cranelift's.
+//!
+//! The function takes the context, the image's address, the frame's address and the parameters, and returns a status (0, or the code of a fault) and the
+//! result. Locals are Cranelift variables; an address is a machine address. What can fail branches to a cold block at the end of the function, one for
+//! each kind of fault, that calls [`crate::runtime`] and returns its code.
+
+mod flow;
+mod memory;
+mod operator;
+
+use crate::defect::Defect;
+use crate::machine::BETWEEN;
+use crate::runtime;
+use cranelift_codegen::ir::condcodes::IntCC;
+use cranelift_codegen::ir::{
+    self, AbiParam, AliasRegionData, BlockArg, FuncRef, InstBuilder, MemFlagsData, SigRef, Signature, StackSlot, Type, Value, types,
+};
+use cranelift_codegen::isa::{CallConv, TargetIsa};
+use cranelift_frontend::{FunctionBuilder, Variable};
+use takt_ir::{Body, BodyId, Const, Inst, Local, Program, SiteId, Ty};
+
+/// The signature of a body with parameters and result of these types.
+pub(crate) fn signature(params: &[Ty], result: Option<Ty>) -> Signature {
+    let mut signature = Signature::new(BETWEEN);
+    signature.params.extend([AbiParam::new(types::I64); 3]);
+    signature.params.extend(params.iter().map(|ty| AbiParam::new(register(*ty))));
+    signature.returns.push(AbiParam::new(types::I32));
+    signature.returns.extend(result.map(|ty| AbiParam::new(register(ty))));
+    signature
+}
+
+/// The type of the register that holds a local.
+fn register(ty: Ty) -> Type {
+    match ty {
+        Ty::I64 | Ty::Addr(_) => types::I64,
+        Ty::F32 => types::F32,
+        Ty::F64 => types::F64,
+    }
+}
+
+/// Fills the function of `builder` with `body`. `pool` is the address of the program's constants.
+pub(crate) fn lower(program: &Program, body: &Body, builder: FunctionBuilder<'_>, isa: &dyn TargetIsa, pool: usize, defect: Defect) {
+    let mut lowering = Lowering::new(program, body, builder, isa, pool, defect);
+    lowering.enter();
+    for (i, block) in body.blocks.iter().enumerate() {
+        lowering.open(i);
+        for inst in &block.insts {
+            lowering.inst(inst);
+        }
+        lowering.close(&block.term);
+    }
+    lowering.cold_blocks();
+    lowering.b.seal_all_blocks();
+    lowering.b.finalize(isa.frontend_config());
+}
+
+/// The kinds of faults, each with one cold block. Its first parameter is the site.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cold {
+    /// value, low, high.
+    Index,
+    /// offset, size.
+    Pointer,
+    Division,
+    Overflow,
+    /// code.
+    Stopped,
+    /// code.
+    Caller,
+}
+
+impl Cold {
+    const ALL: [Self; 6] = [Self::Index, Self::Pointer, Self::Division, Self::Overflow, Self::Stopped, Self::Caller];
+    /// Types behind the site.
+    fn params(self) -> &'static [Type] {
+        match self {
+            Self::Index => &[types::I64, types::I64, types::I64],
+            Self::Pointer => &[types::I64, types::I64],
+            Self::Division | Self::Overflow => &[],
+            Self::Stopped | Self::Caller => &[types::I32],
+        }
+    }
+    /// What it calls.
+    fn address(self) -> usize {
+        match self {
+            Self::Index => runtime::index as *const u8 as usize,
+            Self::Pointer => runtime::pointer as *const u8 as usize,
+            Self::Division => runtime::division as *const u8 as usize,
+            Self::Overflow => runtime::overflow as *const u8 as usize,
+            Self::Stopped => runtime::stopped as *const u8 as usize,
+            Self::Caller => runtime::caller as *const u8 as usize,
+        }
+    }
+}
+
+struct Lowering<'a, 'f> {
+    program: &'a Program,
+    body: &'a Body,
+    b: FunctionBuilder<'f>,
+    defect: Defect,
+    /// The calling convention of Rust's `extern "C"`.
+    host: CallConv,
+    pool: usize,
+    ctx: Value,
+    image: Value,
+    frame: Value,
+    locals: Vec<Variable>,
+    blocks: Vec<ir::Block>,
+    /// Branches to each block that have not been made yet; at 0 it is sealed.
+    missing: Vec<usize>,
+    cold: [Option<ir::Block>; 6],
+    /// Words of native calls.
+    words: Option<StackSlot>,
+    callees: Vec<(BodyId, FuncRef)>,
+    signatures: Vec<(Signature, SigRef)>,
+    image_flags: MemFlagsData,
+    ctx_flags: MemFlagsData,
+}
+
+impl<'a, 'f> Lowering<'a, 'f> {
+    fn new(program: &'a Program, body: &'a Body, mut b: FunctionBuilder<'f>, isa: &dyn TargetIsa, pool: usize, defect: Defect) -> Self {
+        let mut flags = |user_id: u32, description: &'static str| {
+            let region = b.func.dfg.alias_regions.insert(AliasRegionData { user_id, description: description.into() });
+            MemFlagsData::new().with_notrap().with_alias_region(Some(region))
+        };
+        let (image_flags, ctx_flags) = (flags(1, "image"), flags(2, "context").with_aligned());
+        let locals = body.locals.iter().map(|ty| b.declare_var(register(*ty))).collect();
+        let blocks = body.blocks.iter().map(|_| b.create_block()).collect();
+        let entry = b.create_block();
+        b.append_block_params_for_function_params(entry);
+        b.switch_to_block(entry);
+        b.seal_block(entry);
+        let (ctx, image, frame) = (b.block_params(entry)[0], b.block_params(entry)[1], b.block_params(entry)[2]);
+        let mut missing = vec![0; body.blocks.len()];
+        missing[0] = 1;
+        for target in body.blocks.iter().flat_map(|block| flow::targets(&block.term)) {
+            missing[target.0 as usize] += 1;
+        }
+        let host = isa.default_call_conv();
+        let (cold, words, callees, signatures) = ([None; 6], None, Vec::new(), Vec::new());
+        Self {
+            program,
+            body,
+            b,
+            defect,
+            host,
+            pool,
+            ctx,
+            image,
+            frame,
+            locals,
+            blocks,
+            missing,
+            cold,
+            words,
+            callees,
+            signatures,
+            image_flags,
+            ctx_flags,
+        }
+    }
+
+    fn is(&self, defect: Defect) -> bool {
+        self.defect == defect
+    }
+    fn ty(&self, local: Local) -> Ty {
+        self.body.locals[local.0 as usize]
+    }
+    fn get(&mut self, local: Local) -> Value {
+        self.b.use_var(self.locals[local.0 as usize])
+    }
+    fn set(&mut self, local: Local, value: Value) {
+        self.b.def_var(self.locals[local.0 as usize], value);
+    }
+    fn int(&mut self, value: i64) -> Value {
+        self.b.ins().iconst(types::I64, value)
+    }
+    fn zero(&mut self, ty: Type) -> Value {
+        match ty {
+            types::F32 => self.b.ins().f32const(0.0),
+            types::F64 => self.b.ins().f64const(0.0),
+            ty => self.b.ins().iconst(ty, 0),
+        }
+    }
+    /// The constant behind a value, if it is one in sight.
+    fn constant(&self, value: Value) -> Option<i64> {
+        let inst = self.b.func.dfg.value_def(value).inst()?;
+        match self.b.func.dfg.insts[inst] {
+            ir::InstructionData::UnaryImm { opcode: ir::Opcode::Iconst, imm } => Some(imm.bits()),
+            _ => None,
+        }
+    }
+
+    /// The start of the function: parameters, locals, and what the IR counts at an entry.
+    fn enter(&mut self) {
+        let entry = self.b.current_block();
+        let params: Vec<Value> = entry.map(|entry| self.b.block_params(entry)[3..].to_vec()).unwrap_or_default();
+        for (variable, value) in self.locals.clone().into_iter().zip(&params) {
+            self.b.def_var(variable, *value);
+        }
+        // A variable that is read before it is written is 0 by the contract of the front end; the entry says so for those of a defective one.
+        if self.is(Defect::LocalsDirty) {
+            for local in params.len()..self.locals.len() {
+                if self.body.locals[local] == Ty::I64 {
+                    let one = self.int(1);
+                    self.b.def_var(self.locals[local], one);
+                }
+            }
+        }
+        self.admit();
+        self.b.ins().jump(self.blocks[0], &[]);
+        self.reached(0);
+    }
+
+    fn inst(&mut self, inst: &Inst) {
+        match inst {
+            Inst::Const { dst, value } => {
+                let value = match *value {
+                    Const::I64(v) => self.int(v),
+                    Const::F32(bits) => self.b.ins().f32const(ir::immediates::Ieee32::with_bits(bits)),
+                    Const::F64(bits) => self.b.ins().f64const(ir::immediates::Ieee64::with_bits(bits)),
+                };
+                self.set(*dst, value);
+            }
+            Inst::Op { op, dst, args, site } => {
+                let args: Vec<Value> = args.iter().map(|arg| self.get(*arg)).collect();
+                let value = self.operator(*op, &args, *site);
+                self.set(*dst, value);
+            }
+            Inst::Copy { dst, src } => {
+                let value = self.get(*src);
+                self.set(*dst, value);
+            }
+            Inst::Load { dst, mem, base, offset } => {
+                let value = self.load(*mem, *base, *offset);
+                self.set(*dst, value);
+            }
+            Inst::Store { src, mem, base, offset } => {
+                let value = self.get(*src);
+                self.store(*mem, value, *base, *offset);
+            }
+            Inst::Address { dst, base, offset } => {
+                let value = self.address(*base, *offset);
+                self.set(*dst, value);
+            }
+            Inst::Index { dst, base, offset, index, low, high, stride, site } => {
+                let index = self.get(*index);
+                let index = self.bounded(index, *low, *high, *site);
+                let value = self.element(*base, *offset, index, *low, *stride);
+                self.set(*dst, value);
+            }
+            Inst::Check { index, low, high, site } => self.check([*index, *low, *high], *site),
+            Inst::Deref { dst, pointer, site } => {
+                let value = self.deref(*dst, *pointer, *site);
+                self.set(*dst, value);
+            }
+            Inst::Pointer { dst, base, offset } => {
+                let address = self.address(*base, *offset);
+                let value = self.b.ins().isub(address, self.image);
+                self.set(*dst, value);
+            }
+            Inst::Move { dst, dst_offset, src, src_offset, len } => self.move_bytes((*dst, *dst_offset), (*src, *src_offset), *len),
+            Inst::Data { dst, offset, data, len } => self.data((*dst, *offset), *data, *len),
+            Inst::Call { body, args, dst, site } => self.call(*body, args, *dst, *site),
+            Inst::Native { native, args, dst, site } => self.native(*native, args, *dst, *site),
+            Inst::Poll { cost, site } => self.poll(*cost, *site),
+        }
+    }
+
+    /// Goes to the cold block of `kind` if `condition` is not 0; otherwise on.
+    fn fault_if(&mut self, condition: Value, kind: Cold, site: SiteId, facts: &[Value]) {
+        let (cold, args) = self.cold_target(kind, site, facts);
+        let next = self.b.create_block();
+        self.b.ins().brif(condition, cold, &args, next, &[]);
+        self.b.switch_to_block(next);
+        self.b.seal_block(next);
+    }
+    /// Goes on if `condition` is not 0; otherwise to the cold block of `kind`.
+    fn fault_unless(&mut self, condition: Value, kind: Cold, site: SiteId, facts: &[Value]) {
+        let (cold, args) = self.cold_target(kind, site, facts);
+        let next = self.b.create_block();
+        self.b.ins().brif(condition, next, &[], cold, &args);
+        self.b.switch_to_block(next);
+        self.b.seal_block(next);
+    }
+    fn cold_target(&mut self, kind: Cold, site: SiteId, facts: &[Value]) -> (ir::Block, Vec<BlockArg>) {
+        let block = match self.cold[kind as usize] {
+            Some(block) => block,
+            None => {
+                let block = self.b.create_block();
+                self.b.set_cold_block(block);
+                self.b.append_block_param(block, types::I32);
+                for ty in kind.params() {
+                    self.b.append_block_param(block, *ty);
+                }
+                self.cold[kind as usize] = Some(block);
+                block
+            }
+        };
+        let site = self.b.ins().iconst(types::I32, i64::from(site.0));
+        (block, [site].iter().chain(facts).map(|value| BlockArg::Value(*value)).collect())
+    }
+    /// Fills the cold blocks that were used.
+    fn cold_blocks(&mut self) {
+        for kind in Cold::ALL {
+            let Some(block) = self.cold[kind as usize] else { continue };
+            self.b.switch_to_block(block);
+            let mut args = vec![self.ctx];
+            args.extend_from_slice(self.b.block_params(block));
+            if kind == Cold::Caller && self.is(Defect::TraceLost) {
+                self.leave(args[2]);
+                continue;
+            }
+            let code = self.call_host(kind.address(), &args, Some(types::I32));
+            self.leave(code);
+        }
+    }
+    /// Returns the code of a fault.
+    fn leave(&mut self, code: Value) {
+        let mut values = vec![code];
+        if let Some(ty) = self.body.result {
+            values.push(self.zero(register(ty)));
+        }
+        self.b.ins().return_(&values);
+    }
+
+    /// Calls a function of Rust's; the result, or the status if it has none.
+    fn call_host(&mut self, address: usize, args: &[Value], result: Option<Type>) -> Value {
+        let target = self.int(address as i64);
+        self.call_indirect(target, args, result)
+    }
+    fn call_indirect(&mut self, target: Value, args: &[Value], result: Option<Type>) -> Value {
+        let mut signature = Signature::new(self.host);
+        signature.params.extend(args.iter().map(|arg| AbiParam::new(self.b.func.dfg.value_type(*arg))));
+        signature.returns.extend(result.map(AbiParam::new));
+        let known = self.signatures.iter().find(|(known, _)| *known == signature).map(|(_, reference)| *reference);
+        let reference = known.unwrap_or_else(|| {
+            let reference = self.b.import_signature(signature.clone());
+            self.signatures.push((signature, reference));
+            reference
+        });
+        let call = self.b.ins().call_indirect(reference, target, args);
+        self.b.inst_results(call).first().copied().unwrap_or(target)
+    }
+    fn compare(&mut self, cc: IntCC, a: Value, b: Value) -> Value {
+        self.b.ins().icmp(cc, a, b)
+    }
+}

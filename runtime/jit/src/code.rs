@@ -1,0 +1,191 @@
+//! Compiled programs: from IR to memory that can be run, and the way in.
+
+use crate::defect::Defect;
+use crate::machine::{self, Compiled};
+use crate::stack::StackUse;
+use cranelift_codegen::ir::{LibCall, Signature};
+use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};
+use cranelift_module::{FuncId, Module, default_libcall_names};
+use takt_abi::{Context, Fault};
+use takt_ir::{BodyId, Op, Program, Ty, VerifyError};
+
+/// Why a program could not be compiled. Only [`JitError::Verify`] can be the program's fault.
+#[derive(Debug, Clone, PartialEq)]
+pub enum JitError {
+    /// The verifier refuses the program.
+    Verify(VerifyError),
+    /// The code generator refuses a body: too large, or a defect of ours.
+    Body {
+        /// The body's name.
+        name: String,
+        /// What the code generator says.
+        reason: String,
+    },
+    /// The processor or the system's memory does not allow it.
+    Machine(String),
+}
+
+impl std::fmt::Display for JitError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Verify(error) => write!(f, "the program is not well-formed: {error}"),
+            Self::Body { name, reason } => write!(f, "no machine code for `{name}`: {reason}"),
+            Self::Machine(reason) => write!(f, "this machine cannot run compiled programs: {reason}"),
+        }
+    }
+}
+impl std::error::Error for JitError {}
+
+/// Verifies a program and compiles it for the processor we run on.
+///
+/// # Errors
+/// See [`JitError`].
+pub fn compile(program: &Program) -> Result<Code, JitError> {
+    compile_with(program, Defect::None)
+}
+
+/// As [`compile`], with a deliberate mistake in the code.
+#[doc(hidden)]
+pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError> {
+    takt_ir::verify(program).map_err(JitError::Verify)?;
+    let isa = machine::host()?;
+    let pool: Box<[u8]> = program.data.clone().into_boxed_slice();
+    let mut functions = machine::bodies(program, &*isa, pool.as_ptr() as usize, defect)?;
+    let frames: Vec<usize> = functions.iter().map(|f| f.frame).collect();
+    for (k, result) in ENTRIES.into_iter().enumerate() {
+        functions.push(machine::entry(&*isa, result, FuncId::from_u32((frames.len() + k) as u32))?);
+    }
+    let size = functions.iter().map(|f| f.bytes.len()).sum();
+    let (module, addresses) = link(isa, &functions)?;
+    let (bodies, entries) = addresses.split_at(frames.len());
+    let bodies = program.bodies.iter().zip(bodies).map(|(body, &address)| Entry {
+        address,
+        by: entry_of(body.result).filter(|_| body.params == 0).map(|k| entries[k]),
+        site: body.entry_site.0,
+    });
+    let image_size = program.image_size.into();
+    Ok(Code { bodies: bodies.collect(), image_size, size, stack: StackUse::new(program, &frames), module: Some(module), _pool: pool })
+}
+
+/// What bodies that can be run from outside may return.
+const ENTRIES: [Option<Ty>; 4] = [None, Some(Ty::I64), Some(Ty::F32), Some(Ty::F64)];
+
+fn entry_of(result: Option<Ty>) -> Option<usize> {
+    ENTRIES.iter().position(|entry| *entry == result)
+}
+
+/// Places functions beside each other and connects them; addresses in order.
+fn link(isa: cranelift_codegen::isa::OwnedTargetIsa, functions: &[Compiled]) -> Result<(JITModule, Vec<usize>), JitError> {
+    let machine = |reason: String| JitError::Machine(reason);
+    let room: usize = functions.iter().map(|f| f.bytes.len() + 64).sum();
+    let arena = ArenaMemoryProvider::new_with_size(room + (64 << 10)).map_err(|e| machine(e.to_string()))?;
+    let mut builder = JITBuilder::with_isa(isa, default_libcall_names());
+    builder.memory_provider(Box::new(arena));
+    let names = default_libcall_names();
+    // Processors without the rounding instructions call the same functions as the interpreter.
+    for (call, op) in ROUNDING {
+        builder.symbol(names(call), op.address());
+    }
+    let mut module = JITModule::new(builder);
+    let signature = Signature::new(machine::BETWEEN);
+    let mut ids = Vec::with_capacity(functions.len());
+    for _ in functions {
+        ids.push(module.declare_anonymous_function(&signature).map_err(|e| machine(e.to_string()))?);
+    }
+    for (id, function) in ids.iter().zip(functions) {
+        module.define_function_bytes(*id, function.align, &function.bytes, &function.relocations).map_err(|e| machine(e.to_string()))?;
+    }
+    module.finalize_definitions().map_err(|e| machine(e.to_string()))?;
+    let addresses = ids.iter().map(|id| module.get_finalized_function(*id) as usize).collect();
+    Ok((module, addresses))
+}
+
+const ROUNDING: [(LibCall, Op); 6] = [
+    (LibCall::FloorF64, Op::FloorF64),
+    (LibCall::FloorF32, Op::FloorF32),
+    (LibCall::CeilF64, Op::CeilF64),
+    (LibCall::CeilF32, Op::CeilF32),
+    (LibCall::TruncF64, Op::TruncF64),
+    (LibCall::TruncF32, Op::TruncF32),
+];
+
+/// A compiled program. Its memory is executable, never writable, and freed when it is dropped.
+pub struct Code {
+    bodies: Vec<Entry>,
+    image_size: u64,
+    size: usize,
+    stack: StackUse,
+    module: Option<JITModule>,
+    /// Constants, at a fixed address; machine code reads them.
+    _pool: Box<[u8]>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    address: usize,
+    /// The function that leads from Rust into it; `None` with parameters.
+    by: Option<usize>,
+    site: u32,
+}
+
+impl std::fmt::Debug for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Code({} bodies, {} bytes)", self.bodies.len(), self.size)
+    }
+}
+
+type Way = unsafe extern "C" fn(ctx: *mut Context, image: *mut u8, frame: *mut u8, target: usize, result: *mut u64) -> u32;
+
+impl Code {
+    /// Runs a body on the image of `ctx`: 0, or the code of the fault that ended it, with facts, site and call stack in `ctx`, as [`takt_ir::run_body`].
+    ///
+    /// `frame` is the offset at which the body's frame starts. `ctx.image` must point to `ctx.image_size` live bytes that nobody else touches meanwhile,
+    /// `ctx.env` to a live environment. The thread must have [`Code::native_stack_bound`] bytes of stack left. A body with parameters, an image of
+    /// another size than the program's or a frame outside it is [`Fault::Panic`].
+    pub fn run(&self, body: BodyId, frame: u64, ctx: &mut Context) -> u32 {
+        self.call(body, frame, ctx).map_or_else(|code| code, |_| 0)
+    }
+
+    /// As [`Code::run`], with what the body returns as a word (0 if nothing).
+    ///
+    /// # Errors
+    /// The code of the fault.
+    pub fn call(&self, body: BodyId, frame: u64, ctx: &mut Context) -> Result<u64, u32> {
+        let Some((entry, by)) = self.bodies.get(body.0 as usize).and_then(|e| Some((e, e.by?))) else {
+            return Err(ctx.fail(Fault::Panic, 0));
+        };
+        let fits = ctx.image_size == self.image_size && frame <= ctx.image_size && ctx.stack_end <= ctx.image_size && !ctx.image.is_null();
+        if !fits {
+            return Err(ctx.fail(Fault::Panic, entry.site));
+        }
+        let (image, mut result) = (ctx.image, 0);
+        #[allow(unsafe_code, reason = "the way into machine code")]
+        // SAFETY: `by` is the finalized entry function for the result type of the body at `address`; both live as long as `self`. The image has the size
+        // that the program was compiled for and `frame` lies inside; machine code reaches nothing but it, `ctx` and `result`.
+        let code = unsafe { std::mem::transmute::<usize, Way>(by)(ctx, image, image.add(frame as usize), entry.address, &mut result) };
+        if code == 0 { Ok(result) } else { Err(code) }
+    }
+
+    /// Bytes of machine code.
+    pub fn code_size(&self) -> usize {
+        self.size
+    }
+
+    /// Bytes of native stack that one run can use at the most when recursion is at most `depth_limit` deep, [`crate::NATIVE_STACK`] for native functions
+    /// included. A task that preempts another at a poll needs its own share on top.
+    pub fn native_stack_bound(&self, depth_limit: u32) -> usize {
+        self.stack.bound(depth_limit)
+    }
+}
+
+impl Drop for Code {
+    fn drop(&mut self) {
+        if let Some(module) = self.module.take() {
+            #[allow(unsafe_code, reason = "nobody else holds the addresses")]
+            // SAFETY: addresses leave this value only for the length of a borrow of it, so none of its functions is running.
+            unsafe {
+                module.free_memory();
+            }
+        }
+    }
+}
