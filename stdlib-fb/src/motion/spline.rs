@@ -309,7 +309,11 @@ impl Spline {
         };
         let orderly = first <= solved && solved <= filled && eliminated <= filled && first <= segment && segment <= filled && ended <= 1;
         let going_back = back == u64::MAX || (first..filled).contains(&back);
-        if !orderly || !going_back || filled - first > CAPACITY as u64 || knots.len() as u64 != (filled - first) * 5 || bytes.len() % 8 != 0
+        if !orderly
+            || !going_back
+            || filled - first > CAPACITY as u64
+            || knots.len() as u64 != (filled - first) * 5
+            || !bytes.len().is_multiple_of(8)
         {
             return false;
         }
