@@ -45,6 +45,7 @@ const TEXTS: &[(SmcError, &str)] = &[
     (SmcError::SMC_AXIS_NOT_READY_FOR_MOTION, "the axis is not ready to move in its present state"),
     (SmcError::SMC_AXIS_ERROR_DURING_MOTION, "the axis is in an error: reset it with MC_Reset"),
     (SmcError::SMC_FB_CALLED_FROM_WRONG_TASK, "blocks on an axis must be called in the task of its bus"),
+    (SmcError::SMC_BUFFER_MODE_NOT_SUPPORTED, "this buffer mode is not supported: use Aborting or Buffered"),
     (SmcError::SMC_VD_MAX_VELOCITY_EXCEEDED, "the axis would exceed its greatest velocity"),
     (SmcError::SMC_VD_MAX_ACCELERATION_EXCEEDED, "the axis would exceed its greatest acceleration"),
     (SmcError::SMC_VD_MAX_DECELERATION_EXCEEDED, "the axis would exceed its greatest deceleration"),
