@@ -1,1 +1,97 @@
-//! Placeholder.
+//! Tree to checked program to IR.
+//!
+//! Order: every file is parsed; names are collected; types, constants and signatures are resolved on demand (so that declarations may stand in any
+//! order and cycles are found); the image is laid out; bodies are checked and lowered in one walk. Problems are collected, never thrown, and what
+//! depends on an error is silent.
+//!
+//! **The compiler knows no block by name.** It is handed libraries; what it knows itself are the operators and the overloaded functions of
+//! IEC 61131-3 (`ABS`, `LIMIT`, `INT_TO_REAL`, …).
+
+mod body;
+mod call;
+mod constant;
+mod convert;
+mod declare;
+mod emit;
+mod expression;
+mod image;
+mod initial;
+mod intrinsic;
+mod library;
+mod operator;
+mod place;
+mod recursion;
+mod scope;
+mod sites;
+mod statement;
+mod string;
+mod task;
+mod types;
+mod unit;
+
+use takt_syntax::{Diagnostic, FileId, Source};
+
+/// What is compiled.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    /// The user's files, in order; [`FileId`] is the index.
+    pub sources: &'a [Source],
+    /// Libraries; an earlier one hides a later one's names.
+    pub libraries: &'a [&'a takt_abi::Library],
+    /// Choices.
+    pub options: &'a Options,
+}
+
+/// Choices of a project.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Cut integers at each operator instead of when stored, passed or converted.
+    pub iec_arithmetic: bool,
+    /// Implicit conversions that may lose information are errors.
+    pub strict: bool,
+    /// BOOL expressions in global scope (`--until`, conditions of the manifest). Their [`FileId`]s follow those of the sources.
+    pub conditions: Vec<Source>,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Output {
+    /// `None` if there are errors.
+    pub program: Option<takt_ir::Program>,
+    /// Everything there is to say, in order of file and place.
+    pub diagnostics: Vec<Diagnostic>,
+    /// A body with result I64 (0 or 1) per condition.
+    pub conditions: Vec<takt_ir::BodyId>,
+    /// All texts by [`FileId`]: user's, conditions', libraries'.
+    pub files: Vec<Source>,
+}
+
+/// Compiles a program.
+pub fn compile(input: Input<'_>) -> Output {
+    let mut files: Vec<Source> = input.sources.to_vec();
+    files.extend(input.options.conditions.iter().cloned());
+    for library in input.libraries {
+        files
+            .extend(library.sources.iter().map(|(name, text)| Source { name: format!("<{}>/{name}", library.name), text: (*text).into() }));
+    }
+    let (user, conditions) = (input.sources.len(), input.options.conditions.len());
+    let mut diagnostics = Vec::new();
+    let mut trees = Vec::new();
+    for (i, file) in files.iter().enumerate() {
+        let id = FileId(i as u32);
+        if (user..user + conditions).contains(&i) {
+            trees.push(takt_syntax::tree::File::default());
+            continue;
+        }
+        let (tree, found) = takt_syntax::parse(id, &file.text);
+        trees.push(tree);
+        diagnostics.extend(found);
+    }
+    let mut unit = unit::Compiler::new(&input, &files, &trees, diagnostics);
+    let (program, conditions) = unit.run();
+    let mut diagnostics = unit.finish();
+    diagnostics.sort_by_key(|d| (d.span.file, d.span.start, d.span.end, d.code));
+    diagnostics.dedup();
+    let failed = diagnostics.iter().any(|d| d.severity() == takt_syntax::Severity::Error);
+    Output { program: (!failed).then_some(program), diagnostics, conditions, files }
+}

@@ -1,0 +1,399 @@
+//! Bodies: parameters, local variables, statements.
+
+use crate::expression::{Kind, Lowering};
+use crate::place::{Place, mem};
+use crate::scope::{Storage, Variable, key};
+use crate::unit::{Compiler, Job};
+use std::collections::HashSet;
+use takt_ir::{Base, Body, BodyId, Inst, Local, Ty, Type, TypeId};
+use takt_syntax::tree::{ArgKind, Expr, ExprKind, PouKind, Stmt, StmtKind, VarKind};
+use takt_syntax::{Code, FileId, Source, Span};
+
+/// How a variable of a function is passed, in the order of the IR's parameters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Passing {
+    /// A local of this type.
+    Value(Ty),
+    /// An address of so many bytes.
+    Address(u32),
+    /// ARRAY[*]: pointer, then low and high per dimension.
+    Open(u32),
+}
+
+impl<'a> Compiler<'a> {
+    /// The class of local that a scalar type takes; `None` for what lies in memory only.
+    pub(crate) fn register(&self, ty: TypeId) -> Option<Ty> {
+        match self.types.get(ty) {
+            Type::Elem(e) | Type::Subrange { base: e, .. } => Some(mem(*e).ty()),
+            Type::Enum(_) | Type::Pointer(_) | Type::Reference(_) | Type::Error => Some(Ty::I64),
+            _ => None,
+        }
+    }
+
+    /// How a variable of a function is passed; `None` for what is not a parameter.
+    pub(crate) fn passing(&self, v: &Variable<'a>) -> Option<Passing> {
+        match (v.kind, self.types.get(v.ty)) {
+            (VarKind::InOut, Type::OpenArray { dims, .. }) => Some(Passing::Open(*dims)),
+            (VarKind::InOut | VarKind::Output, _) => Some(Passing::Address(self.types.size(v.ty))),
+            (VarKind::Input, _) => Some(match self.register(v.ty) {
+                Some(ty) => Passing::Value(ty),
+                None => Passing::Address(self.types.size(v.ty)),
+            }),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn lower_body(&mut self, id: BodyId, job: Job) -> Body {
+        let (pou, action) = match job {
+            Job::Pou(pou) => (pou, None),
+            Job::Action(pou, action) => (pou, Some(action)),
+        };
+        let tree = self.pous[pou].tree;
+        let (name, statements) = match action {
+            Some(action) => (format!("{}.{}", tree.name.text, tree.actions[action].name.text), &tree.actions[action].body),
+            None => (tree.name.text.clone(), &tree.body),
+        };
+        let mut lowering = Lowering::new(self, id, &name, Some(pou), tree.name.span);
+        lowering.open_unit(statements);
+        lowering.statements(statements);
+        lowering.check_labels();
+        lowering.return_();
+        lowering.finish()
+    }
+
+    /// A BOOL expression in global scope.
+    pub(crate) fn lower_condition(&mut self, file: FileId, source: &'a Source) -> BodyId {
+        let span = Span { file, start: 0, end: source.text.len() as u32 };
+        let (tree, found) = takt_syntax::parse_expression(file, &source.text);
+        let failed = !found.is_empty();
+        self.diagnostics.extend(found);
+        let id = self.reserve(&source.name, span);
+        if failed {
+            return id;
+        }
+        // Conditions are few and live as long as the program.
+        let tree: &'a Expr = Box::leak(Box::new(tree));
+        let mut lowering = Lowering::new(self, id, &source.name, None, span);
+        lowering.b.result = Some(Ty::I64);
+        let operand = lowering.expr(tree);
+        let operand = lowering.condition_operand(operand);
+        let value = lowering.value(&operand);
+        lowering.b.end(takt_ir::Term::Return(Some(value)));
+        let body = lowering.finish();
+        self.program.bodies[id.0 as usize] = body;
+        id
+    }
+}
+
+impl<'a> Lowering<'_, 'a> {
+    /// Parameters, result and local variables of the unit.
+    fn open_unit(&mut self, statements: &'a [Stmt]) {
+        let Some(pou) = self.pou else { return };
+        let tree = self.c.pous[pou].tree;
+        match tree.kind {
+            PouKind::Function => self.open_function(pou, statements),
+            PouKind::FunctionBlock => {
+                let ty = self.c.pous[pou].ty.unwrap_or(TypeId(0));
+                let size = self.c.types.size(ty);
+                self.this = Some(self.b.param(Ty::Addr(size)));
+                self.open_in_outs(pou);
+                self.open_locals(pou, statements);
+            }
+            PouKind::Program => {
+                self.open_in_outs(pou);
+                self.open_locals(pou, statements);
+            }
+        }
+    }
+
+    fn open_function(&mut self, pou: usize, statements: &'a [Stmt]) {
+        let vars = self.c.pous[pou].vars.clone();
+        let taken = self.taken(statements);
+        let mut copies = Vec::new();
+        for (i, v) in vars.iter().enumerate() {
+            let Some(passing) = self.c.passing(v) else { continue };
+            self.storage[i] = match passing {
+                Passing::Value(ty) => {
+                    let param = self.b.param(ty);
+                    if taken.contains(&key(&v.name)) {
+                        copies.push((i, param));
+                    }
+                    Storage::Register(param)
+                }
+                Passing::Address(size) => {
+                    let param = self.b.param(Ty::Addr(size));
+                    if v.kind == VarKind::Input {
+                        copies.push((i, param));
+                    }
+                    Storage::Behind(param)
+                }
+                Passing::Open(dims) => {
+                    let pointer = self.b.param(Ty::I64);
+                    let bounds = (0..dims).map(|_| (self.b.param(Ty::I64), self.b.param(Ty::I64))).collect();
+                    Storage::Open(pointer, bounds)
+                }
+            };
+        }
+        let result = self.c.pous[pou].result;
+        let place = result.filter(|ty| self.c.register(*ty).is_none()).map(|ty| self.b.param(Ty::Addr(self.c.types.size(ty))));
+        for (i, param) in copies {
+            self.copy_parameter(&vars[i], i, param);
+        }
+        for (i, v) in vars.iter().enumerate().filter(|(_, v)| v.kind == VarKind::Output) {
+            let storage = self.storage[i].clone();
+            self.initialise_variable(v, &storage);
+        }
+        self.open_result(pou, result, place);
+        self.open_locals_with(pou, &taken);
+    }
+
+    fn copy_parameter(&mut self, v: &Variable<'a>, i: usize, param: Local) {
+        let (size, align) = self.c.types.layout(v.ty);
+        let slot = self.b.slot(size, align);
+        self.storage[i] = Storage::Frame(slot);
+        match self.b.ty(param) {
+            Ty::Addr(_) => {
+                self.b.push(Inst::Move { dst: Base::Frame, dst_offset: slot, src: Base::Local(param), src_offset: 0, len: size })
+            }
+            _ => self.store(&Place::Memory { base: Base::Frame, offset: slot }, v.ty, param, true, v.span),
+        }
+    }
+
+    fn open_result(&mut self, pou: usize, result: Option<TypeId>, place: Option<Local>) {
+        let Some(ty) = result else { return };
+        let span = self.c.pous[pou].tree.name.span;
+        let storage = match place {
+            Some(address) => Storage::Behind(address),
+            None => {
+                let class = self.c.register(ty).unwrap_or(Ty::I64);
+                self.b.result = Some(class);
+                Storage::Register(self.b.local(class))
+            }
+        };
+        self.default_value(ty, &storage, span);
+        self.result = Some((ty, storage));
+    }
+
+    /// VAR_IN_OUT of a block: the offsets in the instance become checked addresses.
+    fn open_in_outs(&mut self, pou: usize) {
+        for i in 0..self.c.pous[pou].vars.len() {
+            let v = &self.c.pous[pou].vars[i];
+            if v.kind != VarKind::InOut {
+                continue;
+            }
+            let (ty, span) = (v.ty, v.span);
+            let (base, offset) = match self.storage[i] {
+                Storage::This(offset) => (self.this.map_or(Base::Image, Base::Local), offset),
+                Storage::Image(offset) => (Base::Image, offset),
+                _ => continue,
+            };
+            let word = |l: &mut Self, at: u32| {
+                let dst = l.b.local(Ty::I64);
+                l.b.push(Inst::Load { dst, mem: takt_ir::Mem::I64, base, offset: offset + at });
+                dst
+            };
+            let pointer = word(self, 0);
+            self.storage[i] = match *self.c.types.get(ty) {
+                Type::OpenArray { dims, .. } => {
+                    let bounds = (0..dims).map(|d| (word(self, 8 + 16 * d), word(self, 16 + 16 * d))).collect();
+                    Storage::Open(pointer, bounds)
+                }
+                _ => match self.deref(pointer, ty, span) {
+                    Place::Memory { base: Base::Local(address), .. } => Storage::Behind(address),
+                    _ => Storage::Nowhere,
+                },
+            };
+        }
+    }
+
+    fn open_locals(&mut self, pou: usize, statements: &'a [Stmt]) {
+        let taken = self.taken(statements);
+        self.open_locals_with(pou, &taken);
+    }
+
+    /// Variables that live for one call: in registers where nobody asks for their address.
+    fn open_locals_with(&mut self, pou: usize, taken: &HashSet<String>) {
+        let function = self.c.pous[pou].tree.kind == PouKind::Function;
+        for i in 0..self.c.pous[pou].vars.len() {
+            let v = self.c.pous[pou].vars[i].clone();
+            let local = v.kind == VarKind::Temp || function && matches!(v.kind, VarKind::Var | VarKind::Inst);
+            if !local || v.value.is_some() {
+                continue;
+            }
+            let storage = match self.c.register(v.ty) {
+                Some(class) if !taken.contains(&key(&v.name)) => Storage::Register(self.b.local(class)),
+                _ => {
+                    let (size, align) = self.c.types.layout(v.ty);
+                    Storage::Frame(self.b.slot(size, align))
+                }
+            };
+            self.storage[i] = storage.clone();
+            self.initialise_variable(&v, &storage);
+        }
+    }
+
+    /// Gives a local variable its initial value.
+    fn initialise_variable(&mut self, v: &Variable<'a>, storage: &Storage) {
+        let pou = self.pou;
+        if self.c.register(v.ty).is_some() {
+            match v.init {
+                Some(takt_syntax::tree::Init::Expr(e)) => {
+                    let target = self.stored(storage, v.ty, v.span);
+                    let Kind::Place(place) = target.kind else { return };
+                    let value = match self.c.types.get(v.ty) {
+                        Type::Reference(_) => self.expr(e),
+                        _ => self.expr(e),
+                    };
+                    if !value.is_error() {
+                        self.assign_place(&place, v.ty, value, v.span);
+                    }
+                }
+                Some(_) => {
+                    self.report(Code::BadInitializer, v.span, "a list cannot initialise a scalar");
+                }
+                None => self.default_value(v.ty, storage, v.span),
+            }
+            return;
+        }
+        let mut bytes = vec![0; self.c.types.size(v.ty) as usize];
+        let mut late = Vec::new();
+        self.c.fill(v.decl, v.ty, pou, &mut bytes, 0, &mut late);
+        let operand = self.stored(storage, v.ty, v.span);
+        let Kind::Place(Place::Memory { base, offset }) = operand.kind else { return };
+        let data = self.pool(&bytes);
+        self.b.push(Inst::Data { dst: base, offset, data, len: bytes.len() as u32 });
+        for (at, ty, e) in late {
+            self.set_initial(base, offset + at, ty, e);
+        }
+    }
+
+    /// The value a type gives its variables.
+    fn default_value(&mut self, ty: TypeId, storage: &Storage, span: Span) {
+        let bytes = self.c.type_bytes(ty);
+        let operand = self.stored(storage, ty, span);
+        let Kind::Place(place) = operand.kind else { return };
+        match (self.c.register(ty), &place) {
+            (Some(class), _) => {
+                let value = match class {
+                    Ty::F32 => takt_ir::Const::F32(0),
+                    Ty::F64 => takt_ir::Const::F64(0),
+                    _ => takt_ir::Const::I64(bytes.map_or(0, |b| signed(&b))),
+                };
+                let value = self.b.constant(value);
+                self.store(&place, ty, value, true, span);
+            }
+            (None, Place::Memory { base, offset }) => {
+                let size = self.c.types.size(ty);
+                let bytes = bytes.map_or_else(|| vec![0; size as usize], |b| b.to_vec());
+                let data = self.pool(&bytes);
+                self.b.push(Inst::Data { dst: *base, offset: *offset, data, len: size });
+            }
+            _ => {}
+        }
+    }
+
+    /// Names of variables whose address is asked for: by ADR, REF=, or as a VAR_IN_OUT.
+    fn taken(&self, statements: &'a [Stmt]) -> HashSet<String> {
+        let mut taken = HashSet::new();
+        for s in statements {
+            self.taken_statement(s, &mut taken);
+        }
+        taken
+    }
+
+    fn taken_statement(&self, s: &'a Stmt, taken: &mut HashSet<String>) {
+        let all = |list: &'a [Stmt], taken: &mut HashSet<String>| list.iter().for_each(|s| self.taken_statement(s, taken));
+        match &s.kind {
+            StmtKind::Assign { targets, value } => {
+                if targets.iter().any(|(_, op)| *op == takt_syntax::tree::AssignOp::Ref) {
+                    take_name(value, taken);
+                }
+                targets.iter().for_each(|(t, _)| self.taken_expr(t, taken));
+                self.taken_expr(value, taken);
+            }
+            StmtKind::Expr(e) => self.taken_expr(e, taken),
+            StmtKind::If { arms, otherwise } => {
+                for (cond, body) in arms {
+                    self.taken_expr(cond, taken);
+                    all(body, taken);
+                }
+                all(otherwise.as_deref().unwrap_or_default(), taken);
+            }
+            StmtKind::Case { value, arms, otherwise } => {
+                self.taken_expr(value, taken);
+                arms.iter().for_each(|(_, body)| all(body, taken));
+                all(otherwise.as_deref().unwrap_or_default(), taken);
+            }
+            StmtKind::For { from, to, by, body, .. } => {
+                [Some(from), Some(to), by.as_ref()].into_iter().flatten().for_each(|e| self.taken_expr(e, taken));
+                all(body, taken);
+            }
+            StmtKind::While { cond, body } | StmtKind::Repeat { body, until: cond } => {
+                self.taken_expr(cond, taken);
+                all(body, taken);
+            }
+            StmtKind::Try { body, catch, finally } => {
+                all(body, taken);
+                all(catch.as_ref().map(|c| c.1.as_slice()).unwrap_or_default(), taken);
+                all(finally.as_deref().unwrap_or_default(), taken);
+            }
+            _ => {}
+        }
+    }
+
+    fn taken_expr(&self, e: &'a Expr, taken: &mut HashSet<String>) {
+        match &e.kind {
+            ExprKind::Member(a, _) | ExprKind::Part(a, _) | ExprKind::Deref(a) | ExprKind::Unary(_, a) => self.taken_expr(a, taken),
+            ExprKind::Index(a, indices) => {
+                self.taken_expr(a, taken);
+                indices.iter().for_each(|i| self.taken_expr(i, taken));
+            }
+            ExprKind::Binary(_, a, b) | ExprKind::Assign(a, b) => {
+                self.taken_expr(a, taken);
+                self.taken_expr(b, taken);
+            }
+            ExprKind::Call(callee, args) => {
+                self.taken_expr(callee, taken);
+                let by_reference = self.takes_addresses(callee);
+                for arg in args {
+                    if by_reference
+                        && arg.kind == ArgKind::In
+                        && let Some(value) = &arg.value
+                    {
+                        take_name(value, taken);
+                    }
+                    arg.value.iter().for_each(|v| self.taken_expr(v, taken));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether a call may ask for the address of an argument. Unknown callees may.
+    fn takes_addresses(&self, callee: &Expr) -> bool {
+        let ExprKind::Name(name) = &callee.kind else { return true };
+        let local = self.pou.is_some_and(|p| self.c.pous[p].index.contains_key(&key(name)));
+        match self.c.global_name(name) {
+            _ if local => true,
+            Some(crate::scope::Item::Pou(i)) => self.c.pous[i].tree.vars.iter().any(|b| b.kind == VarKind::InOut),
+            Some(crate::scope::Item::NativeFunction(_)) => false,
+            Some(_) => true,
+            None => matches!(key(name).as_str(), "ADR" | "BITADR" | "REF" | "LOWER_BOUND" | "UPPER_BOUND"),
+        }
+    }
+}
+
+fn take_name(e: &Expr, taken: &mut HashSet<String>) {
+    if let ExprKind::Name(name) = &e.kind {
+        taken.insert(key(name));
+    }
+}
+
+/// Little-endian bytes as a number, sign-extended (an enumeration's or subrange's initial value).
+fn signed(bytes: &[u8]) -> i64 {
+    let mut word = [0; 8];
+    let n = bytes.len().min(8);
+    word[..n].copy_from_slice(&bytes[..n]);
+    let shift = 64 - 8 * n as u32;
+    if shift >= 64 { 0 } else { i64::from_le_bytes(word) << shift >> shift }
+}

@@ -1,0 +1,541 @@
+//! Calls: functions, blocks, programs, actions, native functions.
+
+use crate::body::Passing;
+use crate::expression::{Kind, Lowering, Operand, Thing};
+use crate::operator::Class;
+use crate::place::Place;
+use crate::scope::{Variable, key};
+use crate::types::nearest;
+use takt_abi::{FnDesc, Section};
+use takt_ir::{Base, Field, Inst, Local, Mem, StructKind, Structure, Ty, Type, TypeId};
+use takt_syntax::tree::{Arg, ArgKind, Expr, ExprKind, VarKind};
+use takt_syntax::{Code, Span};
+
+impl<'a> Lowering<'_, 'a> {
+    pub(crate) fn call(&mut self, callee: &'a Expr, args: &'a [Arg], span: Span) -> Operand {
+        if let ExprKind::Name(name) = &callee.kind {
+            let wanted = key(name);
+            let local = self.pou.is_some_and(|p| {
+                let pou = &self.c.pous[p];
+                pou.index.contains_key(&wanted) || pou.actions.iter().any(|(n, _)| *n == wanted)
+            });
+            if !local
+                && self.c.global_name(name).is_none_or(|i| matches!(i, crate::scope::Item::Member(..) | crate::scope::Item::Enumerator(..)))
+            {
+                return self.intrinsic(name, callee.span, args, span);
+            }
+            let own_name = self.pou.is_some_and(|p| self.result.is_some() && key(&self.c.pous[p].tree.name.text) == wanted);
+            if own_name && !local {
+                return self.call_function(self.pou.unwrap_or(0), args, span);
+            }
+        }
+        match self.thing(callee) {
+            Thing::Function(pou) => self.call_function(pou, args, span),
+            Thing::Native(desc) => self.call_native(desc, args, span),
+            Thing::Action(pou, action, instance) => self.call_action(pou, action, instance, args, span),
+            Thing::Value(operand) => self.call_instance(operand, args, span),
+            Thing::Type(ty) => {
+                let name = self.type_name(ty);
+                self.check_arguments(args);
+                self.report(Code::NotCallable, callee.span, format!("`{name}` is a type; an instance of it can be called")).help =
+                    Some(format!("declare one: `VAR inst : {name}; END_VAR`, and call `inst(…)`"));
+                self.error(span)
+            }
+            Thing::Error => {
+                self.check_arguments(args);
+                self.error(span)
+            }
+            Thing::List(_) | Thing::Library => {
+                self.report(Code::NotCallable, callee.span, "a list or library cannot be called");
+                self.error(span)
+            }
+        }
+    }
+
+    /// Checks the arguments of a call that is wrong anyway.
+    pub(crate) fn check_arguments(&mut self, args: &'a [Arg]) {
+        for value in args.iter().filter_map(|a| a.value.as_ref()) {
+            self.expr(value);
+        }
+    }
+
+    fn call_action(&mut self, pou: usize, action: usize, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
+        if let Some(arg) = args.first() {
+            self.report(Code::BadArgument, arg.span, "an action takes no arguments");
+        }
+        let body = self.c.action_of(pou, action);
+        let site = self.site(span);
+        let mut words = Vec::new();
+        if self.c.pous[pou].tree.kind == takt_syntax::tree::PouKind::FunctionBlock {
+            let Kind::Place(place) = &instance.kind else { return self.error(span) };
+            words.push(self.address(place, self.c.types.size(instance.ty)));
+        }
+        self.b.push(Inst::Call { body, args: words, dst: None, site });
+        self.void(span)
+    }
+
+    fn void(&mut self, span: Span) -> Operand {
+        let operand = self.error(span);
+        Operand { kind: Kind::Void, ..operand }
+    }
+
+    /// Which parameter each argument is for; wrong ones are reported and left out.
+    fn match_arguments(&mut self, callee: &str, names: &[(&str, Section)], args: &'a [Arg], span: Span) -> Vec<(usize, &'a Arg)> {
+        let mut matched: Vec<(usize, &'a Arg)> = Vec::new();
+        let positional: Vec<usize> = names.iter().enumerate().filter(|(_, n)| n.1 != Section::State).map(|(i, _)| i).collect();
+        for (position, arg) in args.iter().enumerate() {
+            let found = match &arg.name {
+                Some(name) => names.iter().position(|(n, s)| key(n) == key(&name.text) && *s != Section::State),
+                None => positional.get(position).copied(),
+            };
+            let Some(i) = found else {
+                self.wrong_argument(callee, names, arg, args.len(), positional.len());
+                continue;
+            };
+            let out = matches!(arg.kind, ArgKind::Out | ArgKind::NotOut);
+            match (names[i].1, out, arg.name.is_some()) {
+                (Section::Output, false, true) => {
+                    self.report(Code::BadArgument, arg.span, format!("`{}` is an output of `{callee}`", names[i].0)).help =
+                        Some("write `=>`".into());
+                    arg.value.iter().for_each(|v| drop(self.expr(v)));
+                    continue;
+                }
+                (Section::Input | Section::InOut, true, _) => {
+                    self.report(Code::BadArgument, arg.span, format!("`{}` is an input of `{callee}`", names[i].0)).help =
+                        Some("write `:=`".into());
+                    continue;
+                }
+                _ => {}
+            }
+            if matched.iter().any(|(other, _)| *other == i) {
+                self.report(Code::BadArgument, arg.span, format!("`{}` is given twice", names[i].0));
+                continue;
+            }
+            matched.push((i, arg));
+        }
+        let _ = span;
+        matched
+    }
+
+    fn wrong_argument(&mut self, callee: &str, names: &[(&str, Section)], arg: &'a Arg, found: usize, most: usize) {
+        arg.value.iter().for_each(|v| drop(self.expr(v)));
+        match &arg.name {
+            Some(name) => {
+                let near = nearest(&key(&name.text), names.iter().filter(|n| n.1 != Section::State).map(|(n, _)| key(n)));
+                let spelled = near.and_then(|n| names.iter().find(|(m, _)| key(m) == n).map(|(m, _)| *m));
+                self.report(Code::BadArgument, name.span, format!("`{callee}` has no parameter `{}`", name.text)).help =
+                    spelled.map(|n| format!("did you mean `{n}`?"));
+            }
+            None => {
+                self.report(Code::BadArgument, arg.span, format!("`{callee}` takes {most} argument(s), found {found}"));
+            }
+        }
+    }
+
+    fn call_function(&mut self, pou: usize, args: &'a [Arg], span: Span) -> Operand {
+        self.c.resolve_pou(pou, span);
+        let vars: Vec<Variable<'a>> = self.c.pous[pou].vars.iter().filter(|v| self.c.passing(v).is_some()).cloned().collect();
+        let name = self.c.pous[pou].tree.name.text.clone();
+        let names: Vec<(&str, Section)> = vars.iter().map(|v| (v.name.as_str(), section(v.kind))).collect();
+        let matched = self.match_arguments(&name, &names, args, span);
+        let before = self.c.diagnostics.len();
+        let mut words: Vec<Option<Vec<Local>>> = vec![None; vars.len()];
+        for wanted in [VarKind::Input, VarKind::InOut] {
+            for (i, arg) in matched.iter().filter(|(i, _)| vars[*i].kind == wanted) {
+                words[*i] = self.argument(&vars[*i], arg);
+            }
+        }
+        let mut outputs = Vec::new();
+        for (i, v) in vars.iter().enumerate() {
+            let given = matched.iter().find(|(n, _)| *n == i).map(|(_, a)| *a);
+            if words[i].is_none() && given.is_none_or(|_| v.kind == VarKind::Output) {
+                words[i] = self.missing_argument(&name, v, given, &mut outputs, span);
+            }
+        }
+        let result = self.c.pous[pou].result;
+        let site = self.site(span);
+        let body = self.c.body_of(pou);
+        let failed =
+            words.iter().any(Option::is_none) || self.c.diagnostics[before..].iter().any(|d| d.severity() == takt_syntax::Severity::Error);
+        let mut words: Vec<Local> = words.into_iter().flatten().flatten().collect();
+        let value = self.result_of(result, span, |l, dst, place| {
+            words.extend(place);
+            l.b.push(Inst::Call { body, args: words, dst, site });
+        });
+        self.assign_outputs(outputs);
+        if failed { self.error(span) } else { value }
+    }
+
+    /// The call's result: in a local, or in a slot whose address is passed last.
+    fn result_of(&mut self, result: Option<TypeId>, span: Span, emit: impl FnOnce(&mut Self, Option<Local>, Option<Local>)) -> Operand {
+        let Some(ty) = result else {
+            emit(self, None, None);
+            return self.void(span);
+        };
+        match self.c.register(ty) {
+            Some(class) => {
+                let dst = self.b.local(class);
+                emit(self, Some(dst), None);
+                self.exact(dst, ty, span)
+            }
+            None => {
+                let (size, align) = self.c.types.layout(ty);
+                let slot = self.b.slot(size, align);
+                let address = self.b.address(Base::Frame, slot, size);
+                emit(self, None, Some(address));
+                let mut value = self.at(Place::Memory { base: Base::Frame, offset: slot }, ty, span);
+                value.fixed = Some("a result");
+                value
+            }
+        }
+    }
+
+    fn assign_outputs(&mut self, outputs: Vec<(&'a Arg, TypeId, u32)>) {
+        for (arg, ty, slot) in outputs {
+            let value = self.at(Place::Memory { base: Base::Frame, offset: slot }, ty, arg.span);
+            self.assign_output(arg, value);
+        }
+    }
+
+    fn assign_output(&mut self, arg: &'a Arg, value: Operand) {
+        let Some(target) = &arg.value else { return };
+        let value = match arg.kind {
+            ArgKind::NotOut => self.unary(takt_syntax::tree::UnaryOp::Not, value, arg.span),
+            _ => value,
+        };
+        let target = self.expr(target);
+        let value = Operand { span: target.span, ..value };
+        self.assign(target, value);
+    }
+
+    /// A parameter that was not given: its initial value, or a slot for an output.
+    fn missing_argument(
+        &mut self,
+        callee: &str,
+        v: &Variable<'a>,
+        given: Option<&'a Arg>,
+        outputs: &mut Vec<(&'a Arg, TypeId, u32)>,
+        span: Span,
+    ) -> Option<Vec<Local>> {
+        match v.kind {
+            VarKind::Output => {
+                let (size, align) = self.c.types.layout(v.ty);
+                let slot = self.b.slot(size, align);
+                outputs.extend(given.map(|arg| (arg, v.ty, slot)));
+                Some(vec![self.b.address(Base::Frame, slot, size)])
+            }
+            VarKind::Input if v.init.is_some() => {
+                let Some(takt_syntax::tree::Init::Expr(e)) = v.init else { return None };
+                let mut scratch = Lowering::scratch(self.c, None);
+                let operand = scratch.expr(e);
+                let operand = scratch.convert(operand, v.ty);
+                match operand.kind {
+                    Kind::Const(_) => self.pass(v, operand),
+                    _ => {
+                        self.report(Code::NotConstant, e.span, "the default of an input must be a constant");
+                        None
+                    }
+                }
+            }
+            _ => {
+                self.report(Code::MissingArgument, span, format!("`{callee}` needs `{}` : `{}`", v.name, self.c.types.name(v.ty)));
+                None
+            }
+        }
+    }
+
+    fn argument(&mut self, v: &Variable<'a>, arg: &'a Arg) -> Option<Vec<Local>> {
+        let value = arg.value.as_ref()?;
+        match v.kind {
+            VarKind::InOut => self.by_reference(&v.name, v.ty, value),
+            _ => {
+                let operand = self.expr(value);
+                let operand = self.for_parameter(operand, v.ty)?;
+                self.pass(v, operand)
+            }
+        }
+    }
+
+    /// The operand as the parameter's type; strings may keep their own length.
+    fn for_parameter(&mut self, operand: Operand, ty: TypeId) -> Option<Operand> {
+        let same = operand.ty == ty && !matches!(operand.kind, Kind::Void);
+        let operand = if same { operand } else { self.convert(operand, ty) };
+        (!operand.is_error()).then_some(operand)
+    }
+
+    fn pass(&mut self, v: &Variable<'a>, operand: Operand) -> Option<Vec<Local>> {
+        match self.c.passing(v)? {
+            Passing::Value(_) => {
+                let operand = Operand { ty: v.ty, ..operand };
+                Some(vec![self.exact_value(&operand)])
+            }
+            _ => Some(vec![self.aggregate(&operand, v.ty)?]),
+        }
+    }
+
+    /// The address of a string or structure value of exactly this type; strings of other lengths are copied.
+    fn aggregate(&mut self, operand: &Operand, ty: TypeId) -> Option<Local> {
+        let (size, align) = self.c.types.layout(ty);
+        if let (Kind::Place(place @ Place::Memory { .. }), true) = (&operand.kind, operand.ty == ty) {
+            return Some(self.address(place, size));
+        }
+        if !matches!(self.class(ty), Class::Text | Class::Wide) {
+            return None;
+        }
+        let slot = self.b.slot(size, align);
+        self.assign_text(&Place::Memory { base: Base::Frame, offset: slot }, ty, operand, operand.span);
+        Some(self.b.address(Base::Frame, slot, size))
+    }
+
+    /// What a VAR_IN_OUT is given: an address, or pointer and bounds for ARRAY[*].
+    fn by_reference(&mut self, name: &str, ty: TypeId, value: &'a Expr) -> Option<Vec<Local>> {
+        let operand = self.expr(value);
+        if operand.is_error() {
+            return None;
+        }
+        if let Type::OpenArray { elem, dims } = *self.c.types.get(ty) {
+            return self.open_argument(name, elem, dims, &operand);
+        }
+        let place = self.variable_argument(name, ty, &operand)?;
+        Some(vec![self.address(&place, self.c.types.size(ty))])
+    }
+
+    /// The memory place of an argument for a VAR_IN_OUT, if it is a variable of the right type.
+    fn variable_argument(&mut self, name: &str, ty: TypeId, operand: &Operand) -> Option<Place> {
+        let place = match (&operand.kind, operand.fixed) {
+            (Kind::Place(place @ Place::Memory { .. }), None) => place.clone(),
+            (Kind::Place(Place::Bits { .. }), None) => {
+                self.report(Code::BadArgument, operand.span, format!("a bit of a number cannot be passed to the VAR_IN_OUT `{name}`"));
+                return None;
+            }
+            (_, why) => {
+                let what = why.unwrap_or("this");
+                self.report(
+                    Code::BadArgument,
+                    operand.span,
+                    format!("the VAR_IN_OUT `{name}` needs a variable; {what} is none that can be written"),
+                );
+                return None;
+            }
+        };
+        let same = match (self.c.types.get(ty), self.c.types.get(operand.ty)) {
+            (Type::String(wanted), Type::String(found)) | (Type::WString(wanted), Type::WString(found)) => found >= wanted,
+            _ => operand.ty == ty,
+        };
+        if !same {
+            let (wanted, found) = (self.type_name(ty), self.type_name(operand.ty));
+            self.report(Code::TypeMismatch, operand.span, format!("the VAR_IN_OUT `{name}` expected `{wanted}`, found `{found}`"));
+            return None;
+        }
+        Some(place)
+    }
+
+    fn open_argument(&mut self, name: &str, elem: TypeId, dims: u32, operand: &Operand) -> Option<Vec<Local>> {
+        match (self.c.types.get(operand.ty).clone(), &operand.kind, operand.fixed) {
+            (Type::Array { elem: e, dims: bounds }, Kind::Place(place), None) if e == elem && bounds.len() == dims as usize => {
+                let mut words = vec![self.pointer_to(place, operand.ty)];
+                for (low, high) in bounds {
+                    words.push(self.b.int(low));
+                    words.push(self.b.int(high));
+                }
+                Some(words)
+            }
+            (Type::OpenArray { elem: e, dims: d }, Kind::Place(Place::Open { pointer, bounds }), None) if e == elem && d == dims => {
+                Some(std::iter::once(*pointer).chain(bounds.iter().flat_map(|(l, h)| [*l, *h])).collect())
+            }
+            _ => {
+                let found = self.operand_name(operand);
+                let wanted = self.type_name(elem);
+                self.report(
+                    Code::TypeMismatch,
+                    operand.span,
+                    format!("the VAR_IN_OUT `{name}` expected an array variable of `{wanted}` with {dims} dimension(s), found {found}"),
+                );
+                None
+            }
+        }
+    }
+
+    fn call_instance(&mut self, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
+        if instance.is_error() {
+            self.check_arguments(args);
+            return instance;
+        }
+        let structure = match self.c.types.get(instance.ty) {
+            Type::Struct(s) if matches!(s.kind, StructKind::Block | StructKind::Program) => (**s).clone(),
+            _ => {
+                let name = self.operand_name(&instance);
+                self.check_arguments(args);
+                self.report(Code::NotCallable, span, format!("expected a function or block instance, found a value of type {name}"));
+                return self.error(span);
+            }
+        };
+        let Kind::Place(place @ Place::Memory { .. }) = instance.kind.clone() else { return self.error(span) };
+        let names: Vec<(&str, Section)> = structure.fields.iter().map(|f| (f.name.as_str(), f.section)).collect();
+        let matched = self.match_arguments(&structure.name, &names, args, span);
+        for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Input) {
+            self.set_input(&place, &structure.fields[*i], arg);
+        }
+        for (i, field) in structure.fields.iter().enumerate().filter(|(_, f)| f.section == Section::InOut) {
+            match matched.iter().find(|(n, _)| *n == i) {
+                Some((_, arg)) => self.set_in_out(&place, field, arg),
+                None => {
+                    let (wanted, name) = (self.type_name(field.ty), &structure.name);
+                    self.report(
+                        Code::MissingArgument,
+                        span,
+                        format!("`{name}` needs its VAR_IN_OUT `{}` : `{wanted}` at each call", field.name),
+                    );
+                }
+            }
+        }
+        self.invoke(&instance, &structure, &place, span);
+        for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Output) {
+            let field = &structure.fields[*i];
+            let value = self.at(place.inside(field.offset), field.ty, arg.span);
+            self.assign_output(arg, value);
+        }
+        self.void(span)
+    }
+
+    fn invoke(&mut self, instance: &Operand, structure: &Structure, place: &Place, span: Span) {
+        let site = self.site(span);
+        if let Some(desc) = self.c.native_blocks.get(&instance.ty).copied() {
+            match desc.cycle {
+                Some(cycle) => {
+                    let native = self.c.native(desc.name, cycle);
+                    let this = self.pointer_to(place, instance.ty);
+                    self.b.push(Inst::Native { native, args: vec![this], dst: None, site });
+                }
+                None => {
+                    self.report(Code::NotCallable, span, format!("`{}` has no body", structure.name));
+                }
+            }
+            return;
+        }
+        let Some(pou) = self.c.pou_of_type.get(&instance.ty).copied() else { return };
+        let body = self.c.body_of(pou);
+        let args = match structure.kind {
+            StructKind::Program => Vec::new(),
+            _ => vec![self.address(place, structure.size)],
+        };
+        self.b.push(Inst::Call { body, args, dst: None, site });
+    }
+
+    fn set_input(&mut self, place: &Place, field: &Field, arg: &'a Arg) {
+        let Some(value) = &arg.value else { return };
+        let target = place.inside(field.offset);
+        if let Type::Reference(_) = self.c.types.get(field.ty) {
+            let operand = self.expr(value);
+            if !operand.is_error() {
+                let pointer = self.address_of(operand, value.span);
+                let word = self.value(&pointer);
+                self.store(&target, field.ty, word, true, arg.span);
+            }
+            return;
+        }
+        let operand = self.expr(value);
+        if !operand.is_error() {
+            self.assign_place(&target, field.ty, operand, arg.span);
+        }
+    }
+
+    fn set_in_out(&mut self, place: &Place, field: &Field, arg: &'a Arg) {
+        let Some(value) = &arg.value else { return };
+        let operand = self.expr(value);
+        if operand.is_error() {
+            return;
+        }
+        let words = match *self.c.types.get(field.ty) {
+            Type::OpenArray { elem, dims } => self.open_argument(&field.name, elem, dims, &operand),
+            _ => self.variable_argument(&field.name, field.ty, &operand).map(|p| vec![self.pointer_to(&p, operand.ty)]),
+        };
+        let Place::Memory { base, offset } = place.inside(field.offset) else { return };
+        for (i, src) in words.into_iter().flatten().enumerate() {
+            self.b.push(Inst::Store { src, mem: Mem::I64, base, offset: offset + 8 * i as u32 });
+        }
+    }
+
+    /// The address of a variable as POINTER TO its type.
+    pub(crate) fn address_of(&mut self, operand: Operand, span: Span) -> Operand {
+        if operand.is_error() {
+            return operand;
+        }
+        match &operand.kind {
+            Kind::Place(place @ (Place::Memory { .. } | Place::Open { .. })) => {
+                let pointer = self.pointer_to(place, operand.ty);
+                let to = match *self.c.types.get(operand.ty) {
+                    Type::OpenArray { elem, .. } => elem,
+                    _ => operand.ty,
+                };
+                let ty = self.c.types.intern(Type::Pointer(to));
+                self.exact(pointer, ty, span)
+            }
+            _ => {
+                self.report(Code::BadArgument, span, "only a variable has an address");
+                self.error(span)
+            }
+        }
+    }
+
+    pub(crate) fn call_native(&mut self, desc: &'static FnDesc, args: &'a [Arg], span: Span) -> Operand {
+        let names: Vec<(&str, Section)> = desc.params.iter().map(|p| (p.name, Section::Input)).collect();
+        let matched = self.match_arguments(desc.name, &names, args, span);
+        let mut operands: Vec<Option<Operand>> = vec![None; desc.params.len()];
+        let mut failed = matched.len() != args.len();
+        for (i, arg) in matched {
+            operands[i] = arg.value.as_ref().map(|v| self.expr(v));
+        }
+        for (param, operand) in desc.params.iter().zip(&operands) {
+            if operand.is_none() && !failed {
+                failed = true;
+                let ty = self.c.native_type(&param.ty);
+                let wanted = self.type_name(ty);
+                self.report(Code::MissingArgument, span, format!("`{}` needs `{}` : `{wanted}`", desc.name, param.name));
+            }
+        }
+        let operands: Vec<Operand> = operands.into_iter().flatten().collect();
+        if failed || operands.iter().any(Operand::is_error) {
+            return self.error(span);
+        }
+        self.native_with(desc, operands, span)
+    }
+
+    /// Calls a native function with as many operands as it has parameters.
+    pub(crate) fn native_with(&mut self, desc: &'static FnDesc, operands: Vec<Operand>, span: Span) -> Operand {
+        let mut words = Vec::new();
+        for (param, operand) in desc.params.iter().zip(operands) {
+            let ty = self.c.native_type(&param.ty);
+            let Some(operand) = self.for_parameter(operand, ty) else { return self.error(span) };
+            let word = match self.c.register(ty) {
+                Some(_) => Some(self.exact_value(&Operand { ty, ..operand })),
+                None => self.aggregate(&operand, ty),
+            };
+            match word {
+                Some(word) => words.push(word),
+                None => return self.error(span),
+            }
+        }
+        let native = self.c.native(desc.name, desc.call);
+        let ty = self.c.native_type(&desc.result);
+        let site = self.site(span);
+        self.result_of(Some(ty), span, |l, dst, place| {
+            words.extend(place);
+            l.b.push(Inst::Native { native, args: words, dst, site });
+        })
+    }
+
+    /// The class of local for an operand that stays as it is.
+    pub(crate) fn class_of(&self, ty: TypeId) -> Ty {
+        self.c.register(ty).unwrap_or(Ty::I64)
+    }
+}
+
+fn section(kind: VarKind) -> Section {
+    match kind {
+        VarKind::Input => Section::Input,
+        VarKind::Output => Section::Output,
+        VarKind::InOut => Section::InOut,
+        _ => Section::State,
+    }
+}

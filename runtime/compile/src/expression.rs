@@ -1,0 +1,618 @@
+//! Checking and lowering expressions: names, literals, members, operands.
+
+use crate::constant::Value;
+use crate::emit::Builder;
+use crate::place::Place;
+use crate::scope::{Item, Storage, key};
+use crate::types::{elementary, nearest};
+use crate::unit::Compiler;
+use takt_abi::{Elem, FnDesc, Section};
+use takt_ir::{Base, BlockId, Body, BodyId, Const, Local, SiteId, StructKind, Type, TypeId};
+use takt_syntax::tree::{Expr, ExprKind, Literal, LiteralValue, Name, PouKind};
+use takt_syntax::{Code, Diagnostic, Span};
+
+/// What an expression came to.
+#[derive(Debug, Clone)]
+pub(crate) enum Kind {
+    /// Reported; whoever meets it is silent.
+    Error,
+    /// A call without result.
+    Void,
+    /// Known.
+    Const(Value),
+    /// A scalar in a local.
+    Temp(Local),
+    /// In memory or in a variable's register.
+    Place(Place),
+}
+
+/// An expression's value or place with its type.
+#[derive(Debug, Clone)]
+pub(crate) struct Operand {
+    pub(crate) ty: TypeId,
+    pub(crate) kind: Kind,
+    pub(crate) span: Span,
+    /// A literal (or an expression of literals) that takes the type it is needed in.
+    pub(crate) flex: bool,
+    /// A local's value lies within the range of `ty` (it was loaded, compared or cut).
+    pub(crate) exact: bool,
+    /// Why it must not be written.
+    pub(crate) fixed: Option<&'static str>,
+}
+
+impl Operand {
+    pub(crate) fn is_error(&self) -> bool {
+        matches!(self.kind, Kind::Error)
+    }
+}
+
+/// What a name or path means.
+pub(crate) enum Thing {
+    Value(Operand),
+    List(usize),
+    Type(TypeId),
+    Library,
+    Function(usize),
+    Native(&'static FnDesc),
+    /// An action and the instance it runs on.
+    Action(usize, usize, Operand),
+    Error,
+}
+
+/// A loop that EXIT and CONTINUE refer to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Loop {
+    pub(crate) exit: BlockId,
+    pub(crate) next: BlockId,
+}
+
+/// One body being checked and lowered.
+pub(crate) struct Lowering<'c, 'a> {
+    pub(crate) c: &'c mut Compiler<'a>,
+    pub(crate) b: Builder,
+    pub(crate) id: BodyId,
+    pub(crate) pou: Option<usize>,
+    /// Where the unit's variables are, parallel to its table.
+    pub(crate) storage: Vec<Storage>,
+    /// Address of the instance.
+    pub(crate) this: Option<Local>,
+    /// Result variable of a function.
+    pub(crate) result: Option<(TypeId, Storage)>,
+    pub(crate) loops: Vec<Loop>,
+    pub(crate) labels: std::collections::HashMap<String, (BlockId, bool, Span)>,
+    pub(crate) scratch: bool,
+}
+
+impl<'c, 'a> Lowering<'c, 'a> {
+    pub(crate) fn new(c: &'c mut Compiler<'a>, id: BodyId, name: &str, pou: Option<usize>, at: Span) -> Self {
+        let site = c.sites.at(c.files, at, id);
+        let b = Builder::new(name, site);
+        let mut new = Self {
+            c,
+            b,
+            id,
+            pou: None,
+            storage: Vec::new(),
+            this: None,
+            result: None,
+            loops: Vec::new(),
+            labels: Default::default(),
+            scratch: false,
+        };
+        new.enter(pou);
+        new
+    }
+
+    /// A lowering whose code is thrown away: for constants.
+    pub(crate) fn scratch(c: &'c mut Compiler<'a>, pou: Option<usize>) -> Self {
+        let b = Builder::new("", SiteId(0));
+        let mut new = Self {
+            c,
+            b,
+            id: BodyId(0),
+            pou: None,
+            storage: Vec::new(),
+            this: None,
+            result: None,
+            loops: Vec::new(),
+            labels: Default::default(),
+            scratch: true,
+        };
+        new.enter(pou);
+        new
+    }
+
+    /// Looks names up in this unit from now on; a program's variables are at its instance.
+    pub(crate) fn enter(&mut self, pou: Option<usize>) {
+        self.pou = pou;
+        let Some(pou) = pou.map(|p| &self.c.pous[p]) else {
+            self.storage.clear();
+            return;
+        };
+        let program = pou.tree.kind == PouKind::Program;
+        self.storage = pou
+            .vars
+            .iter()
+            .map(|v| match &v.storage {
+                Storage::This(offset) if program => Storage::Image(pou.instance + offset),
+                other => other.clone(),
+            })
+            .collect();
+    }
+
+    pub(crate) fn finish(self) -> Body {
+        self.b.finish()
+    }
+
+    pub(crate) fn site(&mut self, span: Span) -> SiteId {
+        if self.scratch { SiteId(0) } else { self.c.sites.at(self.c.files, span, self.id) }
+    }
+
+    pub(crate) fn report(&mut self, code: Code, span: Span, message: impl Into<String>) -> &mut Diagnostic {
+        self.c.report(code, span, message)
+    }
+
+    pub(crate) fn error(&mut self, span: Span) -> Operand {
+        let ty = self.c.error_type();
+        Operand { ty, kind: Kind::Error, span, flex: false, exact: true, fixed: None }
+    }
+    pub(crate) fn constant(&self, value: Value, ty: TypeId, span: Span) -> Operand {
+        Operand { ty, kind: Kind::Const(value), span, flex: false, exact: true, fixed: Some("a constant") }
+    }
+    pub(crate) fn temp(&self, local: Local, ty: TypeId, span: Span) -> Operand {
+        Operand { ty, kind: Kind::Temp(local), span, flex: false, exact: false, fixed: Some("an expression") }
+    }
+    pub(crate) fn exact(&self, local: Local, ty: TypeId, span: Span) -> Operand {
+        Operand { exact: true, ..self.temp(local, ty, span) }
+    }
+    pub(crate) fn at(&self, place: Place, ty: TypeId, span: Span) -> Operand {
+        Operand { ty, kind: Kind::Place(place), span, flex: false, exact: true, fixed: None }
+    }
+    pub(crate) fn bool_type(&mut self) -> TypeId {
+        self.c.elem(Elem::Bool)
+    }
+    pub(crate) fn type_name(&self, ty: TypeId) -> String {
+        self.c.types.name(ty)
+    }
+
+    /// Lowers an expression that has a value.
+    pub(crate) fn expr(&mut self, e: &'a Expr) -> Operand {
+        match &e.kind {
+            ExprKind::Literal(literal) => self.literal(literal, e.span),
+            ExprKind::Unary(op, a) => {
+                let a = self.expr(a);
+                self.unary(*op, a, e.span)
+            }
+            ExprKind::Binary(op, a, b) => self.binary_expr(*op, a, b, e.span),
+            ExprKind::Call(callee, args) => self.call(callee, args, e.span),
+            ExprKind::Assign(target, value) => {
+                let target = self.expr(target);
+                let value = self.expr(value);
+                self.assign(target.clone(), value);
+                target
+            }
+            ExprKind::Error => self.error(e.span),
+            _ => match self.thing(e) {
+                Thing::Value(operand) => operand,
+                Thing::Error => self.error(e.span),
+                Thing::Function(_) | Thing::Native(_) | Thing::Action(..) => {
+                    self.report(Code::BadStatement, e.span, "a call needs brackets").help = Some("write `name()`".into());
+                    self.error(e.span)
+                }
+                Thing::Type(ty) => {
+                    let name = self.type_name(ty);
+                    self.report(Code::TypeMismatch, e.span, format!("expected a value, found the type `{name}`"));
+                    self.error(e.span)
+                }
+                Thing::List(_) | Thing::Library => {
+                    self.report(Code::TypeMismatch, e.span, "expected a value, found the name of a list or library");
+                    self.error(e.span)
+                }
+            },
+        }
+    }
+
+    /// What a path means: a value, or something that only a member or a call makes one of. References are followed.
+    pub(crate) fn thing(&mut self, e: &'a Expr) -> Thing {
+        match self.thing_raw(e) {
+            Thing::Value(operand) => Thing::Value(self.follow(operand)),
+            other => other,
+        }
+    }
+
+    /// A REFERENCE becomes what it refers to.
+    pub(crate) fn follow(&mut self, operand: Operand) -> Operand {
+        let Type::Reference(to) = *self.c.types.get(operand.ty) else { return operand };
+        let span = operand.span;
+        let pointer = self.value(&operand);
+        let place = self.deref(pointer, to, span);
+        self.at(place, to, span)
+    }
+
+    /// As [`Lowering::thing`], but a REFERENCE stays one.
+    pub(crate) fn thing_raw(&mut self, e: &'a Expr) -> Thing {
+        match &e.kind {
+            ExprKind::Name(name) => self.name(name, e.span),
+            ExprKind::Global(name) => self.global_thing(&name.text, name.span),
+            ExprKind::Member(base, member) => self.member(base, member, e.span),
+            ExprKind::Typed(ty, member) => match self.global_thing(&ty.text, ty.span) {
+                Thing::Type(ty) => self.enumerator(ty, member),
+                Thing::Error => Thing::Error,
+                _ => {
+                    self.report(Code::UnknownType, ty.span, format!("`{}` is not an enumeration", ty.text));
+                    Thing::Error
+                }
+            },
+            ExprKind::Index(base, indices) => Thing::Value(self.index(base, indices, e.span)),
+            ExprKind::Deref(base) => Thing::Value(self.deref_expr(base, e.span)),
+            ExprKind::Part(base, part) => Thing::Value(self.part(base, *part, e.span)),
+            ExprKind::This => self.this_thing(e.span),
+            ExprKind::Super => {
+                self.report(Code::NotSupported, e.span, "SUPER is not supported yet");
+                Thing::Error
+            }
+            ExprKind::Direct(direct) => {
+                self.report(Code::NotSupported, direct.span, "a direct address is not supported in an expression").help =
+                    Some("declare a variable in VAR_GLOBAL and wire it in takt.toml".into());
+                Thing::Error
+            }
+            ExprKind::Error => Thing::Error,
+            _ => Thing::Value(self.expr(e)),
+        }
+    }
+
+    fn this_thing(&mut self, span: Span) -> Thing {
+        match (self.this, self.pou.and_then(|p| self.c.pous[p].ty)) {
+            (Some(this), Some(ty)) => {
+                let place = Place::Memory { base: Base::Local(this), offset: 0 };
+                let pointer = self.pointer_to(&place, ty);
+                let ty = self.c.types.intern(Type::Pointer(ty));
+                Thing::Value(self.exact(pointer, ty, span))
+            }
+            _ => {
+                self.report(Code::BadStatement, span, "THIS is only possible in a FUNCTION_BLOCK");
+                Thing::Error
+            }
+        }
+    }
+
+    fn name(&mut self, name: &str, span: Span) -> Thing {
+        if let Some(pou) = self.pou {
+            let wanted = key(name);
+            if let Some(i) = self.c.pous[pou].index.get(&wanted).copied() {
+                return Thing::Value(self.variable(pou, i, span));
+            }
+            if let Some(action) = self.c.pous[pou].actions.iter().position(|(n, _)| *n == wanted) {
+                let Some(instance) = self.own_instance(pou, span) else { return Thing::Error };
+                return Thing::Action(pou, action, instance);
+            }
+            if let (Some((ty, storage)), true) = (&self.result, key(&self.c.pous[pou].tree.name.text) == wanted) {
+                let (ty, storage) = (*ty, storage.clone());
+                return Thing::Value(self.stored(&storage, ty, span));
+            }
+        }
+        self.global_thing(name, span)
+    }
+
+    fn own_instance(&mut self, pou: usize, span: Span) -> Option<Operand> {
+        let ty = self.c.pous[pou].ty?;
+        let base = match self.this {
+            Some(this) => Place::Memory { base: Base::Local(this), offset: 0 },
+            None => Place::Memory { base: Base::Image, offset: self.c.pous[pou].instance },
+        };
+        Some(self.at(base, ty, span))
+    }
+
+    fn variable(&mut self, pou: usize, i: usize, span: Span) -> Operand {
+        let v = &self.c.pous[pou].vars[i];
+        let (ty, constant) = (v.ty, v.constant);
+        if let Some(value) = v.value.clone() {
+            return self.constant(value, ty, span);
+        }
+        if *self.c.types.get(ty) == Type::Error {
+            return self.error(span);
+        }
+        let storage = self.storage.get(i).cloned().unwrap_or(Storage::Nowhere);
+        let mut operand = self.stored(&storage, ty, span);
+        if constant {
+            operand.fixed = Some("a constant");
+        }
+        operand
+    }
+
+    /// The operand of a variable that lies there.
+    pub(crate) fn stored(&mut self, storage: &Storage, ty: TypeId, span: Span) -> Operand {
+        let place = match storage {
+            Storage::Image(offset) => Place::Memory { base: Base::Image, offset: *offset },
+            Storage::This(offset) => match self.this {
+                Some(this) => Place::Memory { base: Base::Local(this), offset: *offset },
+                None => Place::Memory { base: Base::Image, offset: takt_ir::NULL_ZONE },
+            },
+            Storage::Frame(offset) => Place::Memory { base: Base::Frame, offset: *offset },
+            Storage::Register(local) => Place::Register(*local),
+            Storage::Behind(address) => Place::Memory { base: Base::Local(*address), offset: 0 },
+            Storage::Open(pointer, bounds) => Place::Open { pointer: *pointer, bounds: bounds.clone() },
+            Storage::Nowhere => Place::Memory { base: Base::Image, offset: takt_ir::NULL_ZONE },
+        };
+        self.at(place, ty, span)
+    }
+
+    fn global_thing(&mut self, name: &str, span: Span) -> Thing {
+        match self.c.global_name(name) {
+            Some(item) => self.item(item, name, span),
+            None => {
+                if let Some(e) = elementary(name) {
+                    return Thing::Type(self.c.elem(e));
+                }
+                let help = self.suggest(name);
+                self.report(Code::UnknownName, span, format!("`{name}` is not declared")).help = help;
+                Thing::Error
+            }
+        }
+    }
+
+    fn suggest(&self, name: &str) -> Option<String> {
+        let local = self.pou.and_then(|p| nearest(&key(name), self.c.pous[p].vars.iter().map(|v| key(&v.name))));
+        match (local, self.pou) {
+            (Some(found), Some(p)) => {
+                let spelled = self.c.pous[p].vars.iter().find(|v| key(&v.name) == found).map_or(found, |v| v.name.clone());
+                Some(format!("did you mean `{spelled}`?"))
+            }
+            _ => self.c.suggest(name, false),
+        }
+    }
+
+    fn item(&mut self, item: Item, name: &str, span: Span) -> Thing {
+        match item {
+            Item::Global(i) => Thing::Value(self.global(i, span)),
+            Item::Pou(i) => self.pou_thing(i, span),
+            Item::Type(i) => {
+                let ty = self.c.declared[i].ty;
+                ty.map_or(Thing::Error, Thing::Type)
+            }
+            Item::Ready(ty) | Item::NativeBlock(ty) => Thing::Type(ty),
+            Item::NativeFunction(desc) => Thing::Native(desc),
+            Item::List(i) => Thing::List(i),
+            Item::Library => Thing::Library,
+            Item::Enumerator(ty, value) => Thing::Value(self.constant(Value::Int(value.into()), ty, span)),
+            Item::Member(declared, member) => self.declared_member(declared, member, span),
+            Item::Ambiguous => {
+                self.report(Code::DuplicateName, span, format!("`{name}` is declared in several lists or enumerations")).help =
+                    Some("write the list's or type's name before it".into());
+                Thing::Error
+            }
+        }
+    }
+
+    fn declared_member(&mut self, declared: usize, member: usize, span: Span) -> Thing {
+        let ty = self.c.resolve_declared(declared, span);
+        let Type::Enum(e) = self.c.types.get(ty) else { return Thing::Error };
+        let Some((_, value)) = e.members.get(member) else { return Thing::Error };
+        let value = Value::Int((*value).into());
+        Thing::Value(self.constant(value, ty, span))
+    }
+
+    fn pou_thing(&mut self, i: usize, span: Span) -> Thing {
+        self.c.resolve_pou(i, span);
+        match self.c.pous[i].tree.kind {
+            PouKind::Function => Thing::Function(i),
+            PouKind::FunctionBlock => Thing::Type(self.c.pou_type(i)),
+            PouKind::Program => {
+                let ty = self.c.pou_type(i);
+                let offset = self.c.pous[i].instance.max(takt_ir::NULL_ZONE);
+                Thing::Value(self.at(Place::Memory { base: Base::Image, offset }, ty, span))
+            }
+        }
+    }
+
+    fn global(&mut self, i: usize, span: Span) -> Operand {
+        self.c.resolve_global(i);
+        let Some(var) = &self.c.globals[i].var else { return self.error(span) };
+        let (ty, value, storage, constant) = (var.ty, var.value.clone(), var.storage.clone(), var.constant);
+        if *self.c.types.get(ty) == Type::Error {
+            return self.error(span);
+        }
+        if let Some(value) = value {
+            return self.constant(value, ty, span);
+        }
+        let mut operand = self.stored(&storage, ty, span);
+        if constant {
+            operand.fixed = Some("a constant");
+        }
+        operand
+    }
+
+    fn enumerator(&mut self, ty: TypeId, member: &Name) -> Thing {
+        let Type::Enum(e) = self.c.types.get(ty) else {
+            let name = self.type_name(ty);
+            if *self.c.types.get(ty) != Type::Error {
+                self.report(Code::UnknownMember, member.span, format!("the type `{name}` has no member `{}`", member.text));
+            }
+            return Thing::Error;
+        };
+        match e.members.iter().find(|(n, _)| key(n) == key(&member.text)) {
+            Some((_, value)) => {
+                let value = Value::Int((*value).into());
+                Thing::Value(self.constant(value, ty, member.span))
+            }
+            None => {
+                let near = nearest(&key(&member.text), e.members.iter().map(|(n, _)| key(n)));
+                let name = e.name.clone();
+                self.report(Code::UnknownMember, member.span, format!("`{name}` has no member `{}`", member.text)).help =
+                    near.map(|n| format!("did you mean `{n}`?"));
+                Thing::Error
+            }
+        }
+    }
+
+    fn member(&mut self, base: &'a Expr, member: &Name, span: Span) -> Thing {
+        match self.thing(base) {
+            Thing::Value(operand) => self.field(operand, member, span),
+            Thing::List(list) => match self.c.lists[list].vars.get(&key(&member.text)).copied() {
+                Some(i) => Thing::Value(self.global(i, span)),
+                None => {
+                    let near = nearest(&key(&member.text), self.c.lists[list].vars.keys().cloned());
+                    let near = near.map(|n| self.c.lists[list].vars[&n]).map(|i| self.c.globals[i].decl.name.text.clone());
+                    let name = self.c.lists[list].name.clone();
+                    self.report(Code::UnknownMember, member.span, format!("the list `{name}` has no variable `{}`", member.text)).help =
+                        near.map(|n| format!("did you mean `{n}`?"));
+                    Thing::Error
+                }
+            },
+            Thing::Type(ty) => self.enumerator(ty, member),
+            Thing::Library => match self.c.library_names.get(&key(&member.text)).copied() {
+                Some(item) => self.item(item, &member.text, span),
+                None => {
+                    self.report(Code::UnknownMember, member.span, format!("the library has no `{}`", member.text));
+                    Thing::Error
+                }
+            },
+            Thing::Error => Thing::Error,
+            Thing::Function(_) | Thing::Native(_) | Thing::Action(..) => {
+                self.report(Code::UnknownMember, member.span, format!("a function has no member `{}`", member.text));
+                Thing::Error
+            }
+        }
+    }
+
+    fn field(&mut self, operand: Operand, member: &Name, span: Span) -> Thing {
+        if operand.is_error() {
+            return Thing::Error;
+        }
+        let wanted = key(&member.text);
+        let Type::Struct(structure) = self.c.types.get(operand.ty) else {
+            return self.no_member(&operand, member);
+        };
+        let (kind, found) = (structure.kind, structure.fields.iter().find(|f| key(&f.name) == wanted).cloned());
+        if let Some(pou) = self.c.pou_of_type.get(&operand.ty).copied() {
+            if let Some(action) = self.c.pous[pou].actions.iter().position(|(n, _)| *n == wanted) {
+                return Thing::Action(pou, action, operand);
+            }
+            let i = self.c.pous[pou].index.get(&wanted).copied();
+            if let Some(value) = i.and_then(|i| self.c.pous[pou].vars[i].value.clone()) {
+                let ty = self.c.pous[pou].vars[i.expect("found")].ty;
+                return Thing::Value(self.constant(value, ty, span));
+            }
+        }
+        let Some(field) = found else { return self.no_member(&operand, member) };
+        if kind == StructKind::Block && matches!(field.section, Section::State | Section::InOut) {
+            let what = if field.section == Section::InOut { "VAR_IN_OUT" } else { "VAR" };
+            self.report(
+                Code::NotAccessible,
+                member.span,
+                format!("`{}` is a {what} of the block and cannot be used from outside", member.text),
+            );
+            return Thing::Error;
+        }
+        let Kind::Place(place) = operand.kind else { return Thing::Error };
+        let mut value = self.at(place.inside(field.offset), field.ty, span);
+        value.fixed = operand.fixed;
+        if kind == StructKind::Block && field.section == Section::Output {
+            value.fixed = Some("an output of a block");
+        }
+        Thing::Value(value)
+    }
+
+    fn no_member(&mut self, operand: &Operand, member: &Name) -> Thing {
+        let name = self.type_name(operand.ty);
+        let help = match self.c.types.get(operand.ty) {
+            Type::Struct(s) => nearest(&key(&member.text), s.fields.iter().map(|f| key(&f.name)))
+                .and_then(|n| s.fields.iter().find(|f| key(&f.name) == n).map(|f| format!("did you mean `{}`?", f.name))),
+            Type::Pointer(_) => Some(format!("follow the pointer first: `^.{}`", member.text)),
+            _ => None,
+        };
+        self.report(Code::UnknownMember, member.span, format!("`{name}` has no member `{}`", member.text)).help = help;
+        Thing::Error
+    }
+
+    fn literal(&mut self, literal: &Literal, span: Span) -> Operand {
+        if let Some(name) = &literal.ty {
+            return self.typed_literal(name, &literal.value, span);
+        }
+        let (value, elem) = match &literal.value {
+            LiteralValue::Int(v) => (Value::Int(*v), int_type(*v)),
+            LiteralValue::Real(v) => (Value::Real(*v), Elem::Lreal),
+            LiteralValue::Bool(v) => (Value::Int(i128::from(*v)), Elem::Bool),
+            LiteralValue::String(text) => {
+                let ty = self.c.types.intern(Type::String((text.len() as u32).max(1)));
+                return Operand { flex: true, ..self.constant(Value::Text(text.clone()), ty, span) };
+            }
+            LiteralValue::WString(text) => {
+                let ty = self.c.types.intern(Type::WString((text.len() as u32).max(1)));
+                return Operand { flex: true, ..self.constant(Value::Wide(text.clone()), ty, span) };
+            }
+            LiteralValue::Time(ns) => (Value::Int(ns / 1_000_000), Elem::Time),
+            LiteralValue::Ltime(ns) => (Value::Int(*ns), Elem::Ltime),
+            LiteralValue::Date(days) => (Value::Int(i128::from(*days) * 86_400), Elem::Date),
+            LiteralValue::Ldate(days) => (Value::Int(i128::from(*days) * 86_400_000_000_000), Elem::Ldate),
+            LiteralValue::Tod(ns) => (Value::Int(i128::from(*ns) / 1_000_000), Elem::Tod),
+            LiteralValue::Ltod(ns) => (Value::Int((*ns).into()), Elem::Ltod),
+            LiteralValue::Dt(ns) => (Value::Int(ns / 1_000_000_000), Elem::Dt),
+            LiteralValue::Ldt(ns) => (Value::Int(*ns), Elem::Ldt),
+        };
+        let flex = matches!(literal.value, LiteralValue::Int(_) | LiteralValue::Real(_));
+        let ty = self.c.elem(elem);
+        if let (Value::Int(v), false) = (&value, flex) {
+            let (low, high) = crate::constant::range(elem);
+            if !(low..=high).contains(v) {
+                let name = takt_ir::elem_name(elem);
+                self.report(Code::OutOfRange, span, format!("this literal does not fit the type `{name}`"));
+                return self.error(span);
+            }
+        }
+        Operand { flex, ..self.constant(value, ty, span) }
+    }
+
+    fn typed_literal(&mut self, name: &Name, value: &LiteralValue, span: Span) -> Operand {
+        let untyped = Literal { ty: None, value: value.clone() };
+        let plain = self.literal(&untyped, span);
+        let Some(elem) = elementary(&name.text) else {
+            return match (key(&name.text).as_str(), value) {
+                ("STRING", LiteralValue::String(_)) | ("WSTRING", LiteralValue::WString(_)) => plain,
+                _ => {
+                    self.report(Code::UnknownType, name.span, format!("`{}` is not an elementary type", name.text));
+                    self.error(span)
+                }
+            };
+        };
+        let ty = self.c.elem(elem);
+        let flex = match (elem, &plain.kind) {
+            (Elem::Bool, Kind::Const(Value::Int(v @ (0 | 1)))) => return self.constant(Value::Int(*v), ty, span),
+            (Elem::Char, Kind::Const(Value::Text(t))) if t.len() == 1 => return self.constant(Value::Int(t[0].into()), ty, span),
+            (Elem::Wchar, Kind::Const(Value::Wide(t))) if t.len() == 1 => return self.constant(Value::Int(t[0].into()), ty, span),
+            _ => plain,
+        };
+        let converted = self.convert(flex, ty);
+        Operand { flex: false, ..converted }
+    }
+
+    /// The operand as a local of its type's class. Structures and strings have none.
+    pub(crate) fn value(&mut self, operand: &Operand) -> Local {
+        match &operand.kind {
+            Kind::Temp(local) => *local,
+            Kind::Const(value) => {
+                let value = match (self.c.types.get(operand.ty), value) {
+                    (Type::Elem(Elem::Real), Value::Real(v)) => Const::F32((*v as f32).to_bits()),
+                    (_, Value::Real(v)) => Const::F64(v.to_bits()),
+                    (_, v) => Const::I64(v.word()),
+                };
+                self.b.constant(value)
+            }
+            Kind::Place(place) => self.load(place, operand.ty, operand.span),
+            Kind::Error | Kind::Void => self.b.int(0),
+        }
+    }
+}
+
+/// The smallest of the types that literals take by themselves.
+fn int_type(v: i128) -> Elem {
+    if i16::try_from(v).is_ok() {
+        Elem::Int
+    } else if i32::try_from(v).is_ok() {
+        Elem::Dint
+    } else if i64::try_from(v).is_ok() {
+        Elem::Lint
+    } else {
+        Elem::Ulint
+    }
+}

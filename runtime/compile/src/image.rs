@@ -1,0 +1,157 @@
+//! The image: where globals, programs, statics and stacks lie, and its first bytes.
+
+use crate::initial::Late;
+use crate::scope::{Storage, key};
+use crate::unit::Compiler;
+use takt_abi::Section;
+use takt_ir::{Global, ResourceInstance, StructKind, Type, TypeId};
+use takt_syntax::tree::{PouKind, VarKind};
+use takt_syntax::{Code, Span};
+
+/// Bytes that an application may have, stacks included.
+const LARGEST_IMAGE: u64 = 3 << 30;
+
+impl<'a> Compiler<'a> {
+    /// Takes the next bytes of the image.
+    pub(crate) fn take(&mut self, size: u32, align: u32, at: Span) -> u32 {
+        let start = self.next.next_multiple_of(align.max(1).into());
+        let end = start + u64::from(size);
+        if end > LARGEST_IMAGE {
+            if self.next <= LARGEST_IMAGE {
+                self.report(Code::TooLarge, at, "the program's variables need more than 3 GiB");
+            }
+            self.next = LARGEST_IMAGE + 1;
+            return takt_ir::NULL_ZONE;
+        }
+        self.next = end;
+        start as u32
+    }
+
+    /// Gives every global, static and program its place and its initial bytes.
+    pub(crate) fn lay_out(&mut self) {
+        let mut order: Vec<usize> = (0..self.globals.len()).collect();
+        let list = |i: &usize| self.globals[*i].list.map(|l| (self.lists[l].slot, key(&self.lists[l].name)));
+        order.sort_by_key(list);
+        for i in order {
+            self.lay_out_global(i);
+        }
+        for i in 0..self.pous.len() {
+            self.lay_out_pou(i);
+        }
+    }
+
+    fn lay_out_global(&mut self, i: usize) {
+        let Some(var) = self.globals[i].var.clone() else { return };
+        if let Some(at) = &var.decl.at {
+            self.report(Code::NotSupported, at.span, "direct addresses are not supported yet").help =
+                Some("wire the variable to a channel in the [io] section of takt.toml".into());
+        }
+        let (size, align) = self.types.layout(var.ty);
+        let offset = self.take(size, align.max(if size >= 16 { 16 } else { 1 }), var.span);
+        if let Some(v) = &mut self.globals[i].var {
+            v.storage = Storage::Image(offset);
+        }
+        let name = match self.globals[i].list {
+            Some(list) => format!("{}.{}", self.lists[list].name, var.name),
+            None => var.name.clone(),
+        };
+        let bare = self.globals[i].list.is_none_or(|l| !self.lists[l].qualified_only)
+            && matches!(self.names.get(&key(&var.name)), Some(crate::scope::Item::Global(n)) if *n == i);
+        self.program.globals.push(Global {
+            name,
+            bare,
+            ty: var.ty,
+            offset,
+            constant: var.constant,
+            doc: var.decl.doc.clone().unwrap_or_default(),
+        });
+        self.fill_variable(&var, offset, None);
+        self.resources_in(var.ty, offset);
+    }
+
+    fn fill_variable(&mut self, var: &crate::scope::Variable<'a>, offset: u32, pou: Option<usize>) {
+        let size = self.types.size(var.ty) as usize;
+        let mut bytes = vec![0; size];
+        let mut late = Vec::new();
+        self.fill(var.decl, var.ty, pou, &mut bytes, 0, &mut late);
+        self.write(offset, &bytes);
+        self.late.extend(late.into_iter().map(|(at, ty, expr)| Late { offset: offset + at, ty, expr, pou }));
+    }
+
+    /// Writes initial bytes; zeros at the end of the image cost nothing.
+    fn write(&mut self, offset: u32, bytes: &[u8]) {
+        let Some(used) = bytes.iter().rposition(|b| *b != 0) else { return };
+        let end = offset as usize + used + 1;
+        if self.program.init.len() < end {
+            self.program.init.resize(end, 0);
+        }
+        self.program.init[offset as usize..end].copy_from_slice(&bytes[..=used]);
+    }
+
+    fn lay_out_pou(&mut self, i: usize) {
+        for v in 0..self.pous[i].vars.len() {
+            let var = self.pous[i].vars[v].clone();
+            if var.kind != VarKind::Stat || var.value.is_some() {
+                continue;
+            }
+            let (size, align) = self.types.layout(var.ty);
+            let offset = self.take(size, align, var.span);
+            self.pous[i].vars[v].storage = Storage::Image(offset);
+            self.fill_variable(&var, offset, Some(i));
+            self.resources_in(var.ty, offset);
+        }
+        if self.pous[i].tree.kind == PouKind::Program {
+            self.lay_out_program(i);
+        }
+    }
+
+    fn lay_out_program(&mut self, i: usize) {
+        let tree = self.pous[i].tree;
+        let ty = self.pou_type(i);
+        let (size, align) = self.types.layout(ty);
+        let offset = self.take(size, align.max(16), tree.name.span);
+        self.pous[i].instance = offset;
+        if let Some(bytes) = self.type_bytes(ty) {
+            self.write(offset, &bytes);
+        }
+        let late = self.pous[i].late.clone();
+        self.late.extend(late.into_iter().map(|(at, ty, expr)| Late { offset: offset + at, ty, expr, pou: Some(i) }));
+        let doc = tree.doc.clone().unwrap_or_default();
+        self.program.globals.push(Global { name: tree.name.text.clone(), bare: true, ty, offset, constant: false, doc });
+        self.resources_in(ty, offset);
+    }
+
+    /// Notes the instances with resources inside of a variable.
+    fn resources_in(&mut self, ty: TypeId, offset: u32) {
+        if let Some(make) = self.native_blocks.get(&ty).and_then(|desc| desc.resource) {
+            self.program.resources.push(ResourceInstance { offset, make });
+            return;
+        }
+        match self.types.get(ty).clone() {
+            Type::Array { elem, .. } if self.may_own(elem) => {
+                let stride = self.types.size(elem).max(1);
+                let count = self.types.size(ty) / stride;
+                for n in 0..count {
+                    self.resources_in(elem, offset + n * stride);
+                }
+            }
+            Type::Struct(s) if s.kind != StructKind::Union => {
+                for field in s.fields.iter().filter(|f| f.section != Section::InOut) {
+                    self.resources_in(field.ty, offset + field.offset);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn may_own(&self, ty: TypeId) -> bool {
+        match self.types.get(ty) {
+            Type::Array { elem, .. } => self.may_own(*elem),
+            Type::Struct(s) => {
+                self.native_blocks.get(&ty).is_some_and(|d| d.resource.is_some())
+                    || s.fields.iter().any(|f| f.section != Section::InOut && self.may_own(f.ty))
+            }
+            _ => false,
+        }
+    }
+}
