@@ -191,7 +191,7 @@ impl<'a> Lowering<'_, 'a> {
             _ => return self.refuse(name, &a, span),
         };
         let ty = self.c.elem(real);
-        let a = self.to_real(a, ty);
+        let a = self.as_real(a, ty);
         let result = self.fold_or_emit(if real == Elem::Real { single } else { double }, &[&a], ty, span);
         Operand { exact: true, ..result }
     }
@@ -205,7 +205,7 @@ impl<'a> Lowering<'_, 'a> {
         }
         let single = self.class(y.ty) == Class::Real(Elem::Real) && self.class(x.ty) == Class::Real(Elem::Real);
         let ty = self.c.elem(if single { Elem::Real } else { Elem::Lreal });
-        let (y, x) = (self.to_real(y, ty), self.to_real(x, ty));
+        let (y, x) = (self.as_real(y, ty), self.as_real(x, ty));
         let result = self.fold_or_emit(if single { Op::Atan2F32 } else { Op::Atan2F64 }, &[&y, &x], ty, span);
         Operand { exact: true, ..result }
     }
@@ -439,14 +439,14 @@ impl<'a> Lowering<'_, 'a> {
         let a = Operand { span, ..a };
         match (self.class(a.ty), to) {
             (Class::Text | Class::Wide, Target::Text | Target::Wide) => a,
-            (Class::Text, Target::Elem(e)) => self.from_text(a, e, span),
+            (Class::Text, Target::Elem(e)) => self.number_of(a, e, span),
             (Class::Other | Class::Wide, _) => self.refuse("this conversion", &a, span),
             (_, Target::Elem(e)) => {
                 let ty = self.c.elem(e);
                 let result = self.explicit(Operand { flex: false, ..a }, ty);
                 Operand { flex: false, ty, ..result }
             }
-            (_, Target::Text) => self.to_text(a, span),
+            (_, Target::Text) => self.text_of(a, span),
             (_, Target::Wide) => {
                 self.report(Code::NotSupported, span, "conversion to WSTRING is not supported yet");
                 self.error(span)
@@ -462,7 +462,7 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
-    fn to_text(&mut self, a: Operand, span: Span) -> Operand {
+    fn text_of(&mut self, a: Operand, span: Span) -> Operand {
         let (name, elem) = match self.class(a.ty) {
             Class::Bool => ("BOOL_TO_STRING", Elem::Bool),
             Class::Int(e) if crate::operator::is_unsigned_64(e) => ("ULINT_TO_STRING", Elem::Ulint),
@@ -482,7 +482,7 @@ impl<'a> Lowering<'_, 'a> {
         self.library_function(name, a, span)
     }
 
-    fn from_text(&mut self, a: Operand, e: Elem, span: Span) -> Operand {
+    fn number_of(&mut self, a: Operand, e: Elem, span: Span) -> Operand {
         let name = match e {
             Elem::Real | Elem::Lreal => "STRING_TO_LREAL",
             Elem::Bool => "STRING_TO_BOOL",

@@ -298,7 +298,7 @@ impl<'a> Lowering<'_, 'a> {
         let flex = a.flex && b.flex;
         let single = self.is_single(&a, &b);
         let ty = self.c.elem(if single { Elem::Real } else { Elem::Lreal });
-        let (a, b) = (self.to_real(a, ty), self.to_real(b, ty));
+        let (a, b) = (self.as_real(a, ty), self.as_real(b, ty));
         let result = if is_comparison(op) { self.bool_type() } else { ty };
         let operand = self.fold_or_emit(real_op(op, single), &[&a, &b], result, span);
         Operand { exact: true, flex: flex && matches!(operand.kind, Kind::Const(_)) && !is_comparison(op), ..operand }
@@ -316,7 +316,7 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     /// The operand as the REAL type, without complaint.
-    pub(crate) fn to_real(&mut self, a: Operand, ty: TypeId) -> Operand {
+    pub(crate) fn as_real(&mut self, a: Operand, ty: TypeId) -> Operand {
         if a.ty == ty { a } else { self.explicit(a, ty) }
     }
 
@@ -329,7 +329,7 @@ impl<'a> Lowering<'_, 'a> {
         }
         let single = self.is_single(&a, &b);
         let ty = self.c.elem(if single { Elem::Real } else { Elem::Lreal });
-        let (a, b) = (self.to_real(a, ty), self.to_real(b, ty));
+        let (a, b) = (self.as_real(a, ty), self.as_real(b, ty));
         let result = self.fold_or_emit(if single { Op::PowF32 } else { Op::PowF64 }, &[&a, &b], ty, span);
         Operand { exact: true, ..result }
     }
