@@ -5,6 +5,7 @@
 
 pub mod cnc;
 pub mod motion;
+pub mod standard;
 
 use takt_abi::{AxisRef, AxisState, BlockDesc, BufferMode, ControllerMode, Direction, EnumDesc, FnDesc, Library, SmcError, StructDesc};
 
@@ -30,7 +31,8 @@ const SHARED_ENUMS: &[&EnumDesc] = &[AxisState::DESC, Direction::DESC, BufferMod
 const SHARED_ALIASES: &[(&str, &str)] = &[("AXIS_REF", "AXIS_REF_SM3"), ("SMC_VIRTUAL_AXIS", "AXIS_REF_SM3")];
 
 static BLOCKS: [&BlockDesc; cnc::BLOCKS.len() + motion::BLOCKS.len()] = join(&[cnc::BLOCKS, motion::BLOCKS]);
-static FUNCTIONS: [&FnDesc; cnc::FUNCTIONS.len() + motion::FUNCTIONS.len()] = join(&[cnc::FUNCTIONS, motion::FUNCTIONS]);
+static FUNCTIONS: [&FnDesc; cnc::FUNCTIONS.len() + motion::FUNCTIONS.len() + standard::FUNCTIONS.len()] =
+    join(&[cnc::FUNCTIONS, motion::FUNCTIONS, standard::FUNCTIONS]);
 static STRUCTS: [&StructDesc; SHARED_STRUCTS.len() + cnc::STRUCTS.len() + motion::STRUCTS.len()] =
     join(&[SHARED_STRUCTS, cnc::STRUCTS, motion::STRUCTS]);
 static ENUMS: [&EnumDesc; SHARED_ENUMS.len() + cnc::ENUMS.len() + motion::ENUMS.len()] = join(&[SHARED_ENUMS, cnc::ENUMS, motion::ENUMS]);

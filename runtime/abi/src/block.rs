@@ -74,7 +74,7 @@ macro_rules! wrapped_arg {
         }
     )*};
 }
-wrapped_arg!(Byte, Word, Dword, Lword, StTime, StDate, StTimeOfDay, StDateTime);
+wrapped_arg!(Byte, Word, Dword, Lword, StTime, StDate, StTimeOfDay, StDateTime, StLtime);
 
 impl Arg for f64 {
     fn take(_: &Cx<'_>, word: u64) -> Result<Self, Fault> {

@@ -70,6 +70,8 @@ wrapper! {
     StTimeOfDay(u32) => Tod;
     /// DATE_AND_TIME: seconds since 1970 in 32 bits.
     StDateTime(u32) => Dt;
+    /// LTIME: nanoseconds in 64 bits.
+    StLtime(i64) => Ltime;
 }
 
 /// BOOL: TRUE when the byte is not 0.
