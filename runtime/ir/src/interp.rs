@@ -27,6 +27,8 @@ pub struct Interpreter {
     words: Vec<u64>,
     calls: Vec<Call>,
     result: u64,
+    /// Accesses refused that the verifier should have excluded. Not 0: a defect of the verifier.
+    pub(crate) escapes: u32,
 }
 
 /// A caller, while its callee runs.
@@ -47,7 +49,11 @@ impl Interpreter {
     /// An interpreter with room for the program's usual calls; deeper ones grow it.
     pub fn new(program: &Program) -> Self {
         let locals: usize = program.bodies.iter().map(|b| b.locals.len()).sum();
-        Self { words: Vec::with_capacity(locals.min(1 << 16)), calls: Vec::with_capacity(program.bodies.len().min(1 << 10)), result: 0 }
+        Self {
+            words: Vec::with_capacity(locals.min(1 << 16)),
+            calls: Vec::with_capacity(program.bodies.len().min(1 << 10)),
+            ..Self::default()
+        }
     }
 
     /// As [`run_body`].
@@ -132,7 +138,10 @@ impl<'a> Run<'a> {
     }
     /// What the verifier should have excluded has no site of its own: it is reported at the declaration.
     fn checked<T>(&mut self, result: Result<T, Fault>) -> Result<T, u32> {
-        result.map_err(|fault| self.fail(fault, self.body.entry_site))
+        result.map_err(|fault| {
+            self.own.escapes += 1;
+            self.fail(fault, self.body.entry_site)
+        })
     }
 
     /// Makes the words of the body that starts to run and checks frame, depth and fuel.
@@ -312,5 +321,176 @@ impl<'a> Run<'a> {
         self.ctx.fault_site = site.0;
         self.ctx.trace_len = 0;
         code
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::testing::{Outcome, program, run, run_with, sample};
+    use takt_abi::Fault;
+
+    /// Runs one body without parameters; `code` is what stands behind `body "main"`.
+    #[track_caller]
+    fn main(code: &str) -> Outcome {
+        run(&program(&format!("image 256\nbody \"main\" {code}")))
+    }
+    /// The result of a body.
+    #[track_caller]
+    fn result(locals: &str, code: &str) -> i64 {
+        let outcome = main(&format!("() -> i64 frame 32 @0 local {locals} b0: {code}"));
+        assert_eq!(outcome.fault, None);
+        outcome.result as i64
+    }
+    #[track_caller]
+    fn fault(locals: &str, code: &str) -> (Fault, u32) {
+        let outcome = main(&format!("() frame 32 @0 local {locals} b0: {code} return"));
+        (outcome.fault.expect("a fault"), outcome.site)
+    }
+
+    #[test]
+    fn the_sample_runs_to_its_end() {
+        let outcome = run(&sample());
+        assert_eq!((outcome.fault, outcome.escapes, outcome.depth), (None, 0, 0));
+        assert_eq!(outcome.image[70..72], 0i16.to_le_bytes());
+        assert_eq!(&outcome.image[144..150], b"hallo\0");
+        assert_eq!(&outcome.image[160..166], b"hallo\0");
+        assert_eq!(outcome.image[200], 5);
+        // Six turns, and Count(1) enters Down twice.
+        assert_eq!(outcome.fuel, 1000 - 6 - 2);
+    }
+
+    #[test]
+    fn loads_extend_and_stores_cut() {
+        for (mem, expected) in
+            [("bool", 1), ("i8", -2), ("u8", 254), ("i16", -2), ("u16", 65534), ("i32", -2), ("u32", 4_294_967_294), ("i64", -2)]
+        {
+            let code = format!("v0 = const -2 store.{mem} frame+8, v0 v0 = load.{mem} frame+8 return v0");
+            assert_eq!(result("i64", &code), expected, "{mem}");
+        }
+        assert_eq!(result("i64", "v0 = const -1 store.u8 frame+3, v0 v0 = load.u32 frame+0 return v0"), 0xFF00_0000);
+    }
+
+    #[test]
+    fn a_store_makes_nan_canonical_and_a_copy_does_not() {
+        let nan32 = "v0 = const.f32 0xffc12345 store.f32 image+16, v0 v1 = load.u32 image+16 return v1";
+        assert_eq!(result("f32, i64", nan32), 0x7FC0_0000);
+        let nan64 = "v0 = const.f64 0xfff8000000000001 v2 = copy v0 store.f64 image+16, v2 v1 = load.i64 image+16 return v1";
+        assert_eq!(result("f64, i64, f64", nan64), 0x7FF8_0000_0000_0000);
+        let moved = "v0 = const -1 store.i64 image+16, v0 move image+24, image+16, 8 v0 = load.i64 image+24 return v0";
+        assert_eq!(result("i64", moved), -1);
+    }
+
+    #[test]
+    fn a_local_that_was_not_written_is_zero_at_every_entry() {
+        let text = "image 256 body \"main\" () -> i64 @0 local i64 b0: v0 = call 1() v0 = call 1() return v0
+            body \"f\" () -> i64 @0 local i64, i64 b0: v1 = const 1 v0 = add v0, v1 return v0";
+        assert_eq!(run(&program(text)).result, 1);
+    }
+
+    #[test]
+    fn moves_may_overlap() {
+        let code =
+            "v0 = const 16#".replace("16#", "513") + " store.u16 frame+0, v0 move frame+1, frame+0, 2 v0 = load.u32 frame+0 return v0";
+        assert_eq!(result("i64", &code), 0x02_01_01);
+    }
+
+    #[test]
+    fn an_index_outside_its_bounds_is_a_fault_with_its_facts() {
+        for value in [-3, 5, i64::MIN, i64::MAX] {
+            let code = format!("v0 = const {value} v1 = index image+16 [v0 in -2..4 by 8] @7");
+            assert_eq!(fault("i64, addr:8", &code), (Fault::Index { value, low: -2, high: 4 }, 7));
+        }
+        let bounds = format!("{}..{}", i64::MIN, i64::MAX);
+        let whole = format!("v0 = const {} v1 = index image+16 [v0 in {bounds} by 0] v0 = pointer v1+0 return v0", i64::MAX);
+        assert_eq!(result("i64, addr:8", &whole), 16);
+        assert_eq!(result("i64, addr:8", "v0 = const 4 v1 = index image+24 [v0 in -2..4 by 8] v0 = pointer v1+8 return v0"), 24 + 48 + 8);
+        let check = "v0 = const 5 v1 = const 1 v2 = const 4 check v0 in v1..v2 @3";
+        assert_eq!(fault("i64, i64, i64", check), (Fault::Index { value: 5, low: 1, high: 4 }, 3));
+    }
+
+    #[test]
+    fn a_pointer_is_checked_at_both_ends() {
+        let deref = |pointer: i64| format!("v0 = const {pointer} v1 = deref v0 @4");
+        assert_eq!(fault("i64, addr:8", &deref(0)), (Fault::NullPointer, 4));
+        for pointer in [1, 15, 249, 256, -1, i64::MAX] {
+            assert_eq!(fault("i64, addr:8", &deref(pointer)), (Fault::WildPointer { offset: pointer as u64, size: 8 }, 4));
+        }
+        for pointer in [16, 248] {
+            assert_eq!(result("i64, addr:8", &format!("{} v0 = pointer v1+0 return v0", deref(pointer))), pointer);
+        }
+    }
+
+    #[test]
+    fn division_by_zero_is_a_fault_and_modulo_zero_is_zero() {
+        assert_eq!(fault("i64, i64", "v0 = const 1 v0 = div v0, v1 @2"), (Fault::DivisionByZero, 2));
+        assert_eq!(fault("i64, i64", "v0 = const 1 v0 = div.u v0, v1 @2"), (Fault::DivisionByZero, 2));
+        assert_eq!(result("i64, i64", "v0 = const 7 v0 = rem v0, v1 return v0"), 0);
+        assert_eq!(result("i64, i64", "v0 = const -9223372036854775808 v1 = const -1 v0 = div v0, v1 return v0"), i64::MIN);
+    }
+
+    #[test]
+    fn a_fault_tells_the_calls_from_inside_outwards() {
+        let text = "image 256
+            body \"main\" () @0 b0: call 1() @1 return
+            body \"f\" () @2 b0: call 2() @3 return
+            body \"g\" () @4 b0: fault block 77 @5";
+        let outcome = run(&program(text));
+        assert_eq!((outcome.fault, outcome.site, outcome.trace), (Some(Fault::Block { error: 77 }), 5, vec![3, 1]));
+    }
+
+    #[test]
+    fn recursion_ends_at_the_depth_limit() {
+        let text = "image 256 body \"main\" () @0 b0: call 1() @1 return body \"f\" () recursive @2 b0: call 1() @3 return";
+        let outcome = run(&program(text));
+        let trace: Vec<u32> = vec![3; 20].into_iter().chain([1]).collect();
+        assert_eq!((outcome.fault, outcome.site, outcome.trace), (Some(Fault::StackOverflow { depth: 20 }), 2, trace));
+        assert_eq!((outcome.depth, outcome.fuel), (20, 1000 - 20));
+    }
+
+    #[test]
+    fn a_frame_that_leaves_the_stack_region_is_refused_before_depth_and_fuel() {
+        let text = "image 256 task \"T\" freewheeling priority 0 entry 0 stack 128 48
+            body \"main\" () frame 16 @0 b0: call 1() @1 return
+            body \"f\" () frame 16 recursive @2 b0: call 1() @3 return";
+        let outcome = run(&program(text));
+        assert_eq!((outcome.fault, outcome.site), (Some(Fault::StackOverflow { depth: 2 }), 2));
+        assert_eq!((outcome.trace, outcome.fuel), (vec![3, 3, 1], 998));
+    }
+
+    #[test]
+    fn frames_lie_one_behind_the_other() {
+        let text = "image 256
+            body \"main\" () frame 16 @0 local i64 b0: v0 = const 1 store.i64 frame+0, v0 call 1() call 1() return
+            body \"f\" () @0 b0: call 2() return
+            body \"g\" () frame 16 @0 local i64 b0: v0 = const 2 store.i64 frame+8, v0 return";
+        let outcome = run(&program(text));
+        assert_eq!(outcome.image[192..].chunks(8).map(|c| c[0]).collect::<Vec<_>>(), [1, 0, 0, 2, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn an_endless_loop_ends_with_its_fuel_or_at_the_flag() {
+        let endless = program("image 256 body \"main\" () @0 b0: call 1() @1 return body \"f\" () @2 b0: poll 3 @3 jump b0");
+        let outcome = run(&endless);
+        assert_eq!((outcome.fault, outcome.site, outcome.trace, outcome.fuel), (Some(Fault::Watchdog), 3, vec![1], -2));
+        let outcome = run_with(&endless, 0, 1000, 1);
+        assert_eq!((outcome.fault, outcome.fuel), (Some(Fault::Watchdog), 997));
+    }
+
+    #[test]
+    fn a_native_fault_gets_the_site_of_its_call() {
+        let text = "image 256 native STR_COMPARE
+            body \"main\" () @0 b0: call 1() @1 return
+            body \"f\" () @2 local i64, i64 b0: v0 = const 250 v1 = const 20 native STR_COMPARE(v0, v1, v0, v1) @3 return";
+        let outcome = run(&program(text));
+        assert_eq!((outcome.fault, outcome.site, outcome.trace), (Some(Fault::WildPointer { offset: 250, size: 20 }), 3, vec![1]));
+    }
+
+    #[test]
+    fn what_the_verifier_let_through_is_still_refused() {
+        let mut escaped = program("image 256 body \"main\" () @6 local i64 b0: v0 = load.i64 image+16 return");
+        escaped.bodies[0].blocks[0].insts[0] =
+            crate::Inst::Load { dst: crate::Local(0), mem: crate::Mem::I64, base: crate::Base::Image, offset: 250 };
+        let outcome = run(&escaped);
+        assert_eq!((outcome.fault, outcome.site, outcome.escapes), (Some(Fault::WildPointer { offset: 250, size: 8 }), 6, 1));
     }
 }

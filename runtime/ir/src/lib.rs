@@ -14,6 +14,8 @@ mod parse;
 mod print;
 mod program;
 mod symbols;
+#[cfg(test)]
+mod testing;
 pub mod text;
 mod types;
 mod value;

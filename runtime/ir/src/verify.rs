@@ -217,3 +217,6 @@ fn entry(program: &Program, id: BodyId) -> Result<(), Defect> {
     let body = program.bodies.get(id.0 as usize).ok_or(Defect::Body(id.0))?;
     ensure(body.params == 0, Defect::Entry)
 }
+
+#[cfg(test)]
+mod tests;
