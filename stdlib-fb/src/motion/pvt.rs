@@ -1,13 +1,16 @@
 //! PVT: position, velocity and acceleration from arrays of positions and times, by a spline that may be longer than any array.
 //!
-//! The block copies knots into a resource of fixed size ([`crate::motion::spline::CAPACITY`]) that its instance owns since the program was loaded, and
-//! solves at most [`STEPS`] rows per call, so that a call stays within its 20 µs. A copied instance owns nothing and refuses to work.
+//! The block copies knots into a resource of fixed size ([`crate::motion::spline::CAPACITY`]) that its instance owns since the program was loaded: at
+//! most `COPIES` per call, and then solves at most `STEPS` rows per call, so that a call stays within its 20 µs. A copied instance owns nothing and
+//! refuses to work.
 
 use crate::motion::spline::{KnotError, OVERLAP, Progress, Sample, Spline};
 use takt_abi::{Bool, Cx, Fault, OpenArray, Resource, SmcError, function_block};
 
+/// Knots copied per call.
+const COPIES: usize = 512;
 /// Rows of the equations solved per call.
-const STEPS: usize = 400;
+const STEPS: usize = 1000;
 /// How far a repeated knot may be from the one it repeats, relative to its size (absolute below 1).
 const REPEATED: f64 = 1e-9;
 
@@ -30,8 +33,8 @@ impl Resource for PvtSpline {
 function_block! {
     /// A smooth curve through positions at times: cubic spline with continuous velocity and acceleration (position, velocity, time).
     ///
-    /// **At once.** The rising edge of `bExecute` takes the first `nCount` elements of `Positions` and `Times` (from their lower bounds; both may
-    /// change afterwards) and plans, `bBusy` is TRUE meanwhile (one call for some hundred knots, one more for each 200 more). Then `bReady` is TRUE
+    /// **At once.** The rising edge of `bExecute` takes the first `nCount` elements of `Positions` and `Times` (from their lower bounds) and plans; while
+    /// `bBusy` is TRUE the arrays must stay as they are. Up to 500 knots it is done in that call; ten thousand take 40 calls. Then `bReady` is TRUE
     /// and every call gives `fPosition`, `fVelocity` and `fAcceleration` at `fTime`, whether `bExecute` is still TRUE or not. `fTime` may run forwards,
     /// stand still, run backwards and jump. Before the first knot and after the last the position is held with velocity 0. `bDone` is TRUE while `fTime`
     /// has reached the last knot. `Times` may be any rising quantity, for instance arc length; velocity and acceleration are then derivatives by it.
@@ -105,6 +108,9 @@ function_block! {
             last: Bool,
             /// A window is being planned.
             planning: Bool,
+            /// Knots of the window: all, and those copied so far.
+            count: u32,
+            copied: u32,
             /// It ends the path.
             ends: Bool,
             /// Slope at the path's end.
@@ -134,34 +140,21 @@ function_block! {
 
 impl Pvt {
     fn run(&mut self, spline: &mut Spline, rising: bool, cx: &mut Cx<'_>) -> Result<(), Fault> {
-        if rising {
-            match self.take(spline, cx)? {
-                Ok(()) => (self.planning, self.ends, self.end_slope) = (Bool::TRUE, self.bEndOfData, self.fEndVelocity),
-                Err(error) => self.refused = error,
-            }
+        if rising && let Err(error) = self.accept(spline, cx)? {
+            self.refused = error;
         }
-        if self.planning.get() {
-            *cx.fuel -= STEPS as i64;
-            let end = self.ends.get().then_some(self.end_slope);
-            match spline.work(STEPS, end) {
-                Ok(Progress::More) => {}
-                Ok(Progress::Ready) => self.planning = Bool::FALSE,
-                Err(error) => {
-                    self.planning = Bool::FALSE;
-                    self.refused = match error {
-                        KnotError::NotRising => SmcError::PVT_TIMES_NOT_RISING,
-                        KnotError::NotFinite => SmcError::PVT_INVALID_VALUES,
-                    };
-                    spline.withdraw();
-                }
-            }
+        if self.planning.get()
+            && let Err(error) = self.plan(spline, cx)?
+        {
+            (self.planning, self.refused) = (Bool::FALSE, error);
+            spline.withdraw();
         }
         self.show(spline);
         Ok(())
     }
 
-    /// Copies the knots of the arrays into the spline.
-    fn take(&mut self, spline: &mut Spline, cx: &mut Cx<'_>) -> Result<Result<(), SmcError>, Fault> {
+    /// Takes the order of a rising edge.
+    fn accept(&mut self, spline: &mut Spline, cx: &Cx<'_>) -> Result<Result<(), SmcError>, Fault> {
         let append = self.bAppend.get() && spline.count() > 0;
         if append && self.planning.get() {
             return Ok(Err(SmcError::PVT_NOT_READY));
@@ -176,23 +169,52 @@ impl Pvt {
         if !enough || count > self.Positions.len() || count > self.Times.len() {
             return Ok(Err(SmcError::PVT_TOO_FEW_POINTS));
         }
-        if count - repeated > spline.free() {
-            return Ok(Err(SmcError::PVT_NO_ROOM));
-        }
         if !(self.fStartVelocity.is_finite() && self.fEndVelocity.is_finite()) {
             return Ok(Err(SmcError::PVT_INVALID_VALUES));
         }
-        *cx.fuel -= count as i64;
-        let (times, positions) = (knots(cx, self.Times, count)?, knots(cx, self.Positions, count)?);
         let first = spline.count() - repeated as u64;
-        for (i, (t, p)) in times.zip(positions).enumerate() {
-            if i >= repeated {
-                spline.push(t, p);
-            } else if !spline.knot(first + i as u64).is_some_and(|k| repeats(k.t, t) && repeats(k.p, p)) {
+        for (i, (t, p)) in self.knots(cx, 0, repeated)?.enumerate() {
+            if !spline.knot(first + i as u64).is_some_and(|k| repeats(k.t, t) && repeats(k.p, p)) {
                 return Ok(Err(SmcError::PVT_INVALID_VALUES));
             }
         }
+        if !spline.reserve(count - repeated) {
+            return Ok(Err(SmcError::PVT_NO_ROOM));
+        }
+        (self.planning, self.count, self.copied) = (Bool::TRUE, self.nCount, repeated as u32);
+        (self.ends, self.end_slope) = (self.bEndOfData, self.fEndVelocity);
         Ok(Ok(()))
+    }
+
+    /// This call's share of copying and solving.
+    fn plan(&mut self, spline: &mut Spline, cx: &mut Cx<'_>) -> Result<Result<(), SmcError>, Fault> {
+        let left = self.count.saturating_sub(self.copied) as usize;
+        if left > 0 {
+            let now = left.min(COPIES);
+            *cx.fuel -= now as i64;
+            for (t, p) in self.knots(cx, self.copied as usize, now)? {
+                spline.push(t, p);
+            }
+            self.copied += now as u32;
+        }
+        if self.copied < self.count {
+            return Ok(Ok(()));
+        }
+        *cx.fuel -= STEPS as i64 / 4;
+        Ok(match spline.work(STEPS, self.ends.get().then_some(self.end_slope)) {
+            Ok(Progress::More) => Ok(()),
+            Ok(Progress::Ready) => {
+                self.planning = Bool::FALSE;
+                Ok(())
+            }
+            Err(KnotError::NotRising) => Err(SmcError::PVT_TIMES_NOT_RISING),
+            Err(KnotError::NotFinite) => Err(SmcError::PVT_INVALID_VALUES),
+        })
+    }
+
+    /// Times and positions of `count` knots of the caller's arrays.
+    fn knots<'c>(&self, cx: &'c Cx<'_>, from: usize, count: usize) -> Result<impl Iterator<Item = (f64, f64)> + use<'c>, Fault> {
+        Ok(elements(cx, self.Times, from, count)?.zip(elements(cx, self.Positions, from, count)?))
     }
 
     /// Evaluates and writes the outputs.
@@ -226,9 +248,16 @@ fn repeats(known: f64, given: f64) -> bool {
     (known - given).abs() <= REPEATED * known.abs().max(1.0)
 }
 
-/// The first `count` elements of an array of the caller, which has as many.
-fn knots<'c>(cx: &'c Cx<'_>, array: OpenArray<f64>, count: usize) -> Result<impl Iterator<Item = f64> + use<'c>, Fault> {
-    let bytes = cx.bytes(array.offset, count * size_of::<f64>())?;
+/// `count` elements of an array of the caller.
+fn elements<'c>(cx: &'c Cx<'_>, array: OpenArray<f64>, from: usize, count: usize) -> Result<impl Iterator<Item = f64> + use<'c>, Fault> {
+    if array.offset == 0 {
+        return Err(Fault::NullPointer);
+    }
+    if from + count > array.len() {
+        return Err(Fault::Index { value: array.low.saturating_add_unsigned((from + count) as u64), low: array.low, high: array.high });
+    }
+    let offset = array.offset.saturating_add((from * size_of::<f64>()) as u64);
+    let bytes = cx.bytes(offset, count * size_of::<f64>())?;
     Ok(bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)))
 }
 
@@ -359,7 +388,7 @@ mod tests {
             rig.call();
             calls += 1;
         }
-        assert!(rig.fb.bReady.get() && calls > 60 && rig.fb.nFree == 0);
+        assert!(rig.fb.bReady.get() && calls > 30 && rig.fb.nFree == 0);
         assert!((rig.at(100.0).0 - 10.0 * libm::sin(100.0 / 0.02 * 0.03)).abs() < 0.5);
         rig.at(t[16_000]);
         assert_eq!(rig.fb.nFree, 16_000 - 1024);

@@ -119,13 +119,19 @@ impl Spline {
         &mut self.ring[(i & MASK) as usize]
     }
 
-    /// Adds a knot; it counts after [`Spline::work`]. The caller has looked at [`Spline::free`]; without room the knot is lost.
-    pub fn push(&mut self, t: f64, p: f64) {
-        if self.free() == 0 {
-            return;
+    /// Makes room for `knots` more, giving up the oldest where it must; false, and nothing is given up, when that is more than [`Spline::free`].
+    pub fn reserve(&mut self, knots: usize) -> bool {
+        let fits = knots <= self.free();
+        if fits {
+            self.first = self.first.max((self.filled + knots as u64).saturating_sub(CAPACITY as u64));
         }
+        fits
+    }
+
+    /// Adds a knot; it counts after [`Spline::work`]. Without room ([`Spline::reserve`]) it is lost.
+    pub fn push(&mut self, t: f64, p: f64) {
         if self.filled - self.first == CAPACITY as u64 {
-            self.first = self.segment.saturating_sub(HISTORY).max(self.first);
+            return;
         }
         *self.at_mut(self.filled) = Knot { t, p, ..Knot::default() };
         self.filled += 1;
@@ -460,7 +466,7 @@ mod tests {
         let mut now = 0.0;
         while now < 99_000.0 {
             let room = s.free().min(500) as u64;
-            assert!(room > 0);
+            assert!(room > 0 && s.reserve(room as usize));
             (given..given + room).for_each(|i| s.push(i as f64, place(i)));
             given += room;
             while s.work(256, None).expect("good knots") == Progress::More {}
