@@ -55,3 +55,95 @@ takt_abi::native_fn! {
     /// Compares the WSTRING(`ACap`) at `A` with the WSTRING(`BCap`) at `B` unit by unit: -1, 0 or 1.
     pub fn WSTR_COMPARE as WstrCompare(cx, A: u64, ACap: u32, B: u64, BCap: u32) -> i64 { compare(cx, A, ACap, B, BCap, 2) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_abi::{Env, NoHost, Resources, Time};
+
+    /// Runs on 64 bytes that hold `text` at 16.
+    fn with<T>(text: &[u8], run: impl FnOnce(&mut Cx<'_>) -> T) -> (T, Vec<u8>, i64) {
+        let mut image = vec![0xEE; 64];
+        image[16..16 + text.len()].copy_from_slice(text);
+        let mut env = Env {
+            now: Time(0),
+            period: Time(1),
+            task: 0,
+            cycle: 0,
+            bus_task: 0,
+            bus_period: Time(1),
+            resources: Resources::default(),
+            host: Box::new(NoHost),
+        };
+        let mut fuel = 100;
+        let result = run(&mut Cx::new(&mut image, &mut env, &mut fuel, 0));
+        (result, image, fuel)
+    }
+    #[track_caller]
+    fn assigned(dst: u64, dst_cap: u32, src_cap: u32, expected: &[u8]) {
+        let (len, image, _) = with(b"hello\0", |cx| StrAssign::call(cx, dst, dst_cap, 16, src_cap));
+        assert_eq!(len, Ok(expected.len() as i64 - 2));
+        assert_eq!(&image[dst as usize..dst as usize + expected.len()], expected);
+    }
+
+    #[test]
+    fn an_assignment_ends_with_nul_and_leaves_the_rest() {
+        assigned(32, 10, 10, b"hello\0\xEE");
+        assigned(32, 3, 10, b"hel\0\xEE");
+        assigned(32, 10, 2, b"he\0\xEE");
+        assigned(32, 0, 10, b"\0\xEE");
+        assigned(18, 10, 10, b"hello\0\xEE");
+        assigned(14, 10, 10, b"hello\0o");
+        assigned(16, 10, 10, b"hello\0\xEE");
+    }
+
+    #[test]
+    fn an_assignment_is_cut_at_exactly_its_capacity() {
+        let (len, image, _) = with("aä\0".as_bytes(), |cx| StrAssign::call(cx, 32, 2, 16, 10));
+        assert_eq!((len, &image[32..36]), (Ok(2), &b"a\xC3\0\xEE"[..]));
+    }
+
+    #[test]
+    fn comparison_is_by_bytes_and_units() {
+        let order = |a: &[u8], b: &[u8]| {
+            let text = [a, &[0, 0][..], b, &[0, 0]].concat();
+            let second = 16 + a.len() as u64 + 2;
+            let narrow = with(&text, |cx| StrCompare::call(cx, 16, 8, second, 8)).0;
+            let wide = with(&text, |cx| WstrCompare::call(cx, 16, 4, second, 4)).0;
+            (narrow, wide)
+        };
+        assert_eq!(order(b"ab", b"ab"), (Ok(0), Ok(0)));
+        assert_eq!(order(b"ab", b"abcd"), (Ok(-1), Ok(-1)));
+        assert_eq!(order(b"\xFFa", b"a\xFF"), (Ok(1), Ok(-1)));
+    }
+
+    #[test]
+    fn wide_texts_count_units() {
+        let (len, image, _) = with(b"a\0b\0c\0\0\0", |cx| WstrAssign::call(cx, 32, 2, 16, 10));
+        assert_eq!((len, &image[32..39]), (Ok(2), &b"a\0b\0\0\0\xEE"[..]));
+    }
+
+    #[test]
+    fn a_place_outside_the_image_is_a_fault() {
+        let wild = |dst, cap, src| with(b"hello\0", |cx| StrAssign::call(cx, dst, cap, src, 10)).0;
+        assert_eq!(wild(60, 4, 16), Err(Fault::WildPointer { offset: 60, size: 5 }));
+        assert_eq!(wild(u64::MAX, 4, 16), Err(Fault::WildPointer { offset: u64::MAX, size: 5 }));
+        assert_eq!(wild(32, 4, 0), Err(Fault::NullPointer));
+        assert_eq!(wild(0, 4, 16), Err(Fault::NullPointer));
+        assert_eq!(wild(32, u32::MAX, 16), Err(Fault::WildPointer { offset: 32, size: 1 << 32 }));
+        assert_eq!(
+            with(b"", |cx| StrAssign::call(cx, 16, u32::MAX, 16, u32::MAX)).0,
+            Err(Fault::WildPointer { offset: 16, size: u64::from(u32::MAX) })
+        );
+    }
+
+    #[test]
+    fn long_texts_take_fuel() {
+        let mut image = vec![b'a'; 4096];
+        let (_, _, fuel) = with(b"", |cx| {
+            let mut own = Cx::new(&mut image, cx.env, cx.fuel, 0);
+            StrAssign::call(&mut own, 16, 1024, 2048, 1024)
+        });
+        assert_eq!(fuel, 96);
+    }
+}

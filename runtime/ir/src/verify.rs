@@ -94,7 +94,7 @@ pub enum Defect {
     Parameters,
     /// A size that is no multiple of 16, or an image smaller than its null zone.
     Size(u32),
-    /// A cycle of calls through no body that is marked as recursive.
+    /// A body on a cycle of calls that is not marked as recursive.
     Recursion,
     /// More initial bytes than the image has.
     Init,
@@ -131,7 +131,7 @@ impl std::fmt::Display for Defect {
             Self::Unassigned(n) => write!(f, "the address in local {n} may be read before it is written"),
             Self::Parameters => write!(f, "more parameters than locals"),
             Self::Size(n) => write!(f, "{n} is no size for an image or frame"),
-            Self::Recursion => write!(f, "a cycle of calls through no body marked as recursive"),
+            Self::Recursion => write!(f, "the body calls itself, directly or through others, and is not marked as recursive"),
             Self::Init => write!(f, "more initial bytes than the image has"),
             Self::Entry => write!(f, "a body that is started from outside takes parameters"),
             Self::Stack(n) => write!(f, "the stack region of task {n} leaves the image or overlaps another"),

@@ -1,50 +1,61 @@
-//! Calls: every cycle goes through a body that counts its depth, so that no program can nest calls without limit.
+//! Calls: every body on a cycle counts its depth, so that no program can nest calls without limit, and a bound of the native stack can be told.
 
 use super::{Defect, VerifyError};
-use crate::inst::{BodyId, Inst};
+use crate::inst::{Body, BodyId, Inst};
 use crate::program::Program;
 
 pub(super) fn check(program: &Program) -> Result<(), VerifyError> {
-    let callees: Vec<Vec<u32>> = program.bodies.iter().map(|b| callees(b, program)).collect();
-    // 0: not seen, 1: on the way, 2: done.
-    let mut seen = vec![0u8; program.bodies.len()];
-    for start in 0..program.bodies.len() {
-        if seen[start] == 0 && !program.bodies[start].recursive {
-            walk(start, &callees, &mut seen)?;
+    let calls: Vec<Vec<usize>> = program.bodies.iter().map(callees).collect();
+    let ends = ends(&calls);
+    let unmarked = (0..calls.len()).filter(|body| !ends[*body] && !program.bodies[*body].recursive);
+    for body in unmarked {
+        if reaches_itself(body, &calls) {
+            return Err(VerifyError { body: Some(BodyId(body as u32)), ..Defect::Recursion.into() });
         }
     }
     Ok(())
 }
 
-/// Bodies that it calls, without those that count their depth.
-fn callees(body: &crate::inst::Body, program: &Program) -> Vec<u32> {
-    let calls = body.blocks.iter().flat_map(|b| &b.insts).filter_map(|i| if let Inst::Call { body, .. } = i { Some(body.0) } else { None });
-    let mut callees: Vec<u32> = calls.filter(|id| !program.bodies[*id as usize].recursive).collect();
+fn callees(body: &Body) -> Vec<usize> {
+    let insts = body.blocks.iter().flat_map(|block| &block.insts);
+    let mut callees: Vec<usize> =
+        insts.filter_map(|i| if let Inst::Call { body, .. } = i { Some(body.0 as usize) } else { None }).collect();
     callees.sort_unstable();
     callees.dedup();
     callees
 }
 
-/// Depth first, with its own stack: body and the next of its callees.
-fn walk(start: usize, callees: &[Vec<u32>], seen: &mut [u8]) -> Result<(), VerifyError> {
-    let mut path = vec![(start, 0)];
-    seen[start] = 1;
-    while let Some((body, next)) = path.last_mut() {
-        let id = *body;
-        let Some(&callee) = callees[id].get(*next) else {
-            seen[id] = 2;
-            path.pop();
-            continue;
-        };
-        *next += 1;
-        match seen[callee as usize] {
-            0 => {
-                seen[callee as usize] = 1;
-                path.push((callee as usize, 0));
+/// Bodies from which no call leads to a cycle: those without calls, then those that call only such, and so on.
+fn ends(calls: &[Vec<usize>]) -> Vec<bool> {
+    let mut callers = vec![vec![]; calls.len()];
+    for (body, callees) in calls.iter().enumerate() {
+        callees.iter().for_each(|callee| callers[*callee].push(body));
+    }
+    let mut open: Vec<usize> = calls.iter().map(Vec::len).collect();
+    let mut ends = vec![false; calls.len()];
+    let mut waiting: Vec<usize> = (0..calls.len()).filter(|body| open[*body] == 0).collect();
+    while let Some(body) = waiting.pop() {
+        ends[body] = true;
+        for &caller in &callers[body] {
+            open[caller] -= 1;
+            if open[caller] == 0 {
+                waiting.push(caller);
             }
-            1 => return Err(VerifyError { body: Some(BodyId(callee)), ..Defect::Recursion.into() }),
-            _ => {}
         }
     }
-    Ok(())
+    ends
+}
+
+fn reaches_itself(start: usize, calls: &[Vec<usize>]) -> bool {
+    let mut seen = vec![false; calls.len()];
+    let mut waiting = calls[start].clone();
+    while let Some(body) = waiting.pop() {
+        if body == start {
+            return true;
+        }
+        if !std::mem::replace(&mut seen[body], true) {
+            waiting.extend(&calls[body]);
+        }
+    }
+    false
 }

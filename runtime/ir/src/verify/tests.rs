@@ -133,14 +133,16 @@ fn calls_and_ends_fit() {
 }
 
 #[test]
-fn a_cycle_of_calls_counts_its_depth() {
-    let cycle = |mark: &str| {
-        read(&format!(
-            "image 16 body \"a\" () @0 b0: call 1() return body \"b\" () {mark} @0 b0: call 2() return body \"c\" () @0 b0: call 1() return"
-        ))
+fn every_body_on_a_cycle_of_calls_counts_its_depth() {
+    let cycle = |b: &str, c: &str| {
+        let body = |name: &str, mark: &str, callee: u32| format!("body \"{name}\" () {mark} @0 b0: call {callee}() return ");
+        read(&format!("image 16 {}{}{}", body("a", "", 1), body("b", b, 2), body("c", c, 1)))
     };
-    assert_eq!(verify(&cycle("")).map_err(|e| e.defect), Err(Defect::Recursion));
-    assert_eq!(verify(&cycle("recursive")), Ok(()));
+    let unmarked = |program: Program| verify(&program).map_err(|e| (e.defect, e.body.map(|b| b.0)));
+    assert_eq!(unmarked(cycle("", "")), Err((Defect::Recursion, Some(1))));
+    assert_eq!(unmarked(cycle("recursive", "")), Err((Defect::Recursion, Some(2))));
+    assert_eq!(unmarked(cycle("recursive", "recursive")), Ok(()));
+    assert_eq!(unmarked(read("image 16 body \"a\" () @0 b0: call 0() return")), Err((Defect::Recursion, Some(0))));
 }
 
 #[test]
