@@ -1,0 +1,1 @@
+//! The segment as a master sees it.
