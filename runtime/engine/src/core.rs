@@ -49,6 +49,7 @@ pub(crate) struct Core {
     pub io_faults: u64,
     pub forces: Vec<Force>,
     pub fuel_limit: u64,
+    pub depth_limit: u32,
     pub clock: Clock,
     pub watchdog: Time,
     pub stopwatch: Option<fn() -> u64>,

@@ -101,6 +101,15 @@ impl Engine {
         &self.core.program
     }
 
+    /// Bytes of native stack that a step can use at the most: the thread that calls [`Engine::step`] must have them.
+    pub fn native_stack(&self) -> usize {
+        let core = &self.core;
+        match &core.executor {
+            Executor::Interpreter => 2 * takt_jit::NATIVE_STACK * core.tasks.len(),
+            Executor::Jit(code) => code.native_stack_bound(core.depth_limit) * core.tasks.len() + takt_jit::NATIVE_STACK,
+        }
+    }
+
     /// Index of the task that owns the bus.
     pub fn bus_task(&self) -> usize {
         self.core.bus

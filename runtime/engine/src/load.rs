@@ -11,15 +11,19 @@ use crate::memory::{Image, Lane, Pinned};
 use crate::options::{Clock, ExecutorKind, Options};
 use crate::schedule::{TaskState, default_bus_task};
 use std::cell::OnceCell;
+use std::rc::Rc;
 use std::sync::Arc;
 use takt_abi::{Elem, Env, Plain, Resources, Time};
 use takt_ir::{Program, Type, VerifyError, verify};
+use takt_jit::JitError;
 
 /// Why a program cannot be loaded.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LoadError {
     /// The program breaks a rule of the IR (a defect of the compiler).
     Verify(VerifyError),
+    /// The program cannot be compiled to machine code (a defect of Takt).
+    Jit(JitError),
     /// There is no task.
     NoTask,
     /// No task has this name.
@@ -96,6 +100,7 @@ impl std::fmt::Display for LoadError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Verify(error) => write!(f, "the program is not sound (a defect of Takt; please report it): {error}"),
+            Self::Jit(error) => write!(f, "the program cannot be compiled to machine code: {error}"),
             Self::NoTask => write!(f, "the program has no task"),
             Self::BusTask { name, known } => write!(f, "there is no task `{name}`; there are: {}", known.join(", ")),
             Self::Memory { size } => write!(f, "no memory for an image of {size} bytes"),
@@ -115,7 +120,8 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     check_axes(&program, &options, driver.size().drives)?;
     let links = links(&program, &options.wires, driver.as_ref())?;
     let executor = match options.executor {
-        ExecutorKind::Interpreter | ExecutorKind::Jit => Executor::Interpreter,
+        ExecutorKind::Interpreter => Executor::Interpreter,
+        ExecutorKind::Jit => Executor::Jit(Rc::new(takt_jit::compile(&program).map_err(LoadError::Jit)?)),
     };
     let mut image = Image::new(program.image_size as usize).ok_or(LoadError::Memory { size: program.image_size })?;
     let mut env = Pinned::new(Env {
@@ -150,6 +156,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         io_fault: None,
         io_faults: 0,
         forces: Vec::new(),
+        depth_limit: options.depth_limit,
         fuel_limit: options.fuel_limit.min(i64::MAX as u64 / 2),
         clock: options.clock,
         watchdog: options.watchdog,

@@ -146,6 +146,7 @@ pub(crate) fn execute(
         let lane = unsafe { &mut *lane.as_ptr() };
         match executor {
             Executor::Interpreter => lane.interpreter.run(&program, body, frame, &mut lane.ctx),
+            Executor::Jit(code) => code.run(body, frame, &mut lane.ctx),
         }
     }));
     RUNNING.set(before);

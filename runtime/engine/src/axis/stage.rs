@@ -275,7 +275,7 @@ impl Axis {
 
     fn wrapped(&self, position: f64) -> f64 {
         let period = self.config.modulo;
-        if period > 0.0 { position - (position / period).floor() * period } else { position }
+        if period > 0.0 { position.rem_euclid(period) } else { position }
     }
 
     /// The drive follows what is sent.
@@ -455,7 +455,7 @@ impl Axis {
                 self.abort_homing(r);
                 (r.nAxisState, r.nCommandedBy) = (AxisState::power_off, 0);
             }
-            Goal::QuickStop if !self.quick_stop => {
+            Goal::QuickStop if !self.quick_stop || r.nAxisState != AxisState::stopping => {
                 self.quick_stop = true;
                 self.abort_homing(r);
                 (r.nAxisState, r.nCommandedBy) = (AxisState::stopping, 0);
