@@ -15,6 +15,8 @@ pub mod moves;
 #[cfg(test)]
 mod oracle;
 pub mod path_law;
+#[cfg(test)]
+mod phone;
 pub mod power;
 pub mod profile;
 pub mod pvt;

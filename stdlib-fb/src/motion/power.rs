@@ -1,6 +1,7 @@
 //! MC_Power and MC_Reset: the axis' power and its errors.
 
-use takt_abi::{AxisRef, AxisState, Bool, SmcError, function_block};
+use std::mem::offset_of;
+use takt_abi::{AxisRef, AxisState, Bool, Dword, Plain, SmcError, function_block};
 
 function_block! {
     /// Switches an axis on and off, in every cycle. Inputs act only while `Enable` is TRUE: power off is `Enable` TRUE with `bRegulatorOn` FALSE;
@@ -36,20 +37,24 @@ function_block! {
         state {}
     }
     fn cycle(fb, cx) {
-        let mut axis = cx.get(fb.Axis)?;
         let in_place = cx.in_bus_task();
-        if fb.Enable.get() && in_place && (axis.bRegulatorOn != fb.bRegulatorOn || axis.bDriveStart != fb.bDriveStart) {
-            (axis.bRegulatorOn, axis.bDriveStart) = (fb.bRegulatorOn, fb.bDriveStart);
-            cx.set(fb.Axis, &axis)?;
+        // Called in every cycle: reads and writes only the fields it needs.
+        let axis = cx.bytes_mut(fb.Axis.0, size_of::<AxisRef>())?;
+        if fb.Enable.get() && in_place {
+            fb.bRegulatorOn.store(&mut axis[offset_of!(AxisRef, bRegulatorOn)..]);
+            fb.bDriveStart.store(&mut axis[offset_of!(AxisRef, bDriveStart)..]);
         }
-        (fb.bRegulatorRealState, fb.bDriveStartRealState) = (axis.bRegulatorRealState, axis.bDriveStartRealState);
-        let failed = axis.nAxisState == AxisState::errorstop;
-        let on = axis.bRegulatorRealState.get() && axis.bDriveStartRealState.get() && axis.nAxisState != AxisState::power_off;
+        fb.bRegulatorRealState = Bool::load(&axis[offset_of!(AxisRef, bRegulatorRealState)..]);
+        fb.bDriveStartRealState = Bool::load(&axis[offset_of!(AxisRef, bDriveStartRealState)..]);
+        let state = AxisState::load(&axis[offset_of!(AxisRef, nAxisState)..]);
+        let id = Dword::load(&axis[offset_of!(AxisRef, dwErrorID)..]).0;
+        let failed = state == AxisState::errorstop;
+        let on = fb.bRegulatorRealState.get() && fb.bDriveStartRealState.get() && state != AxisState::power_off;
         fb.Status = (on && !failed).into();
         fb.ErrorID = match in_place {
             false => SmcError::SMC_FB_CALLED_FROM_WRONG_TASK,
-            true if failed && axis.dwErrorID.0 == 0 => SmcError::SMC_DI_AXIS_ERROR,
-            true if failed => SmcError(i16::try_from(axis.dwErrorID.0).unwrap_or(SmcError::SMC_DI_AXIS_ERROR.0)),
+            true if failed && id == 0 => SmcError::SMC_DI_AXIS_ERROR,
+            true if failed => SmcError(i16::try_from(id).unwrap_or(SmcError::SMC_DI_AXIS_ERROR.0)),
             true => SmcError::SMC_NO_ERROR,
         };
         fb.Error = (fb.ErrorID != SmcError::SMC_NO_ERROR).into();

@@ -1,6 +1,6 @@
 //! MC_ReadStatus and MC_ReadActualPosition: an axis as outputs. They may be called in any task.
 
-use takt_abi::{AxisRef, AxisState, Bool, SmcError, function_block};
+use takt_abi::{AxisRef, AxisState, Bool, Plain, SmcError, function_block};
 
 function_block! {
     /// The state of an axis as BOOLs, while `Enable` is TRUE.
@@ -82,7 +82,8 @@ function_block! {
     fn cycle(fb, cx) {
         (fb.Valid, fb.Busy) = (fb.Enable, fb.Enable);
         if fb.Enable.get() {
-            fb.Position = cx.get(fb.Axis)?.fActPosition;
+            let axis = cx.bytes(fb.Axis.0, size_of::<AxisRef>())?;
+            fb.Position = f64::load(&axis[std::mem::offset_of!(AxisRef, fActPosition)..]);
         }
         Ok(())
     }
