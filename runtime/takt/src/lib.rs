@@ -1,9 +1,20 @@
 //! The tool: manifest, commands, files for programs.
 //!
 //! Only this crate touches files, wall clocks and serialization for the tool's own purposes. Everything a command does can be called as a library:
-//! [`manifest::read`] a manifest.
+//! [`project::load`] reads a project, [`machine::Machine::new`] makes it run.
 
+pub mod clock;
+pub mod commands;
 pub mod host;
+pub mod language;
+pub mod machine;
 pub mod manifest;
+pub mod messages;
+pub mod platform;
+pub mod plot;
+pub mod program;
+pub mod project;
 pub mod sources;
 pub mod spelling;
+pub mod trace;
+pub mod values;

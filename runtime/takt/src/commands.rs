@@ -1,0 +1,195 @@
+//! The command line (DESIGN §9): one file per command.
+
+mod check;
+mod explain;
+mod live;
+mod run;
+mod summary;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use takt_abi::Time;
+
+/// How a command ended; the exit code of the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Good.
+    Good = 0,
+    /// Findings, a failed test or a fault.
+    Findings = 1,
+    /// Wrong usage, missing file, bad manifest.
+    Usage = 2,
+}
+
+/// Takt: an IEC 61131-3 Structured Text runtime for machines that move.
+#[derive(Debug, Parser)]
+#[command(name = "takt", version, about, long_about = None)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Runs a program or a project.
+    Run(RunArgs),
+    /// Finds the mistakes in a program or a project.
+    Check(CheckArgs),
+    /// Explains a code like E0301.
+    Explain(ExplainArgs),
+}
+
+/// What `takt run` is told.
+#[derive(Debug, Clone, Args)]
+pub struct RunArgs {
+    /// A project folder (with takt.toml) or source files; several are one program.
+    #[arg(required = true, value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// Ends after so many scans of the fastest task.
+    #[arg(long, value_name = "N")]
+    pub cycles: Option<u64>,
+    /// Ends after so much machine time: 500ms, 10s, 1m30s.
+    #[arg(long = "for", value_name = "TIME", value_parser = duration)]
+    pub duration: Option<Time>,
+    /// Ends when an ST condition becomes TRUE.
+    #[arg(long, value_name = "EXPR")]
+    pub until: Option<String>,
+    /// real, max, or a factor of real time. Default: real, but max with --cycles, --for, --until and for a demonstration.
+    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    pub speed: Option<Speed>,
+    /// What runs the program.
+    #[arg(long, value_name = "ENGINE", default_value = "jit")]
+    pub engine: EngineKind,
+    /// Writes a variable once, before the first scan.
+    #[arg(long, value_name = "VAR=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+    /// Shows a variable after the last scan.
+    #[arg(long, value_name = "VAR")]
+    pub print: Vec<String>,
+    /// Writes the recorded variables to a CSV file, one line per scan.
+    #[arg(long, value_name = "FILE", requires = "record")]
+    pub trace: Option<PathBuf>,
+    /// Variables of the trace.
+    #[arg(long, value_name = "VAR,…", value_delimiter = ',', requires = "trace")]
+    pub record: Vec<String>,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// Draws the run: path, tool axes, speed, valve.
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+struct CheckArgs {
+    /// A project folder (with takt.toml) or source files; several are one program.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// How findings are shown.
+    #[arg(long, value_name = "FORMAT", default_value = "text")]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Args)]
+struct ExplainArgs {
+    /// E0301, W0301, …; without one all codes are listed.
+    code: Option<String>,
+}
+
+/// What runs a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EngineKind {
+    /// Machine code.
+    Jit,
+    /// The reference interpreter.
+    Interp,
+}
+
+/// How findings are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people, on standard error.
+    Text,
+    /// One object per line, on standard output.
+    Json,
+}
+
+/// How fast machine time passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Speed {
+    /// As fast as the processor can.
+    Max,
+    /// So many times real time.
+    Factor(f64),
+}
+
+fn speed(text: &str) -> Result<Speed, String> {
+    match text {
+        "max" => Ok(Speed::Max),
+        "real" => Ok(Speed::Factor(1.0)),
+        _ => match text.parse() {
+            Ok(factor) if (0.001..=1000.0).contains(&factor) => Ok(Speed::Factor(factor)),
+            _ => Err("expected real, max, or a factor from 0.001 to 1000".into()),
+        },
+    }
+}
+
+fn duration(text: &str) -> Result<Time, String> {
+    crate::manifest::parse_duration(text).ok_or_else(|| "expected a number and a unit, like 500ms, 10s or 1m30s".into())
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    let (variable, value) = text.split_once('=').ok_or("expected VAR=VALUE, like GVL.Speed=12.5")?;
+    Ok((variable.trim().trim_end_matches(':').trim_end().into(), value.trim().into()))
+}
+
+/// Runs a command.
+pub fn execute(cli: Cli) -> Exit {
+    match cli.command {
+        Command::Run(args) => run::execute(&args),
+        Command::Check(args) => check::execute(&args.paths, args.format),
+        Command::Explain(args) => explain::execute(args.code.as_deref()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(arguments: &[&str]) -> Result<RunArgs, clap::Error> {
+        let cli = Cli::try_parse_from(["takt", "run"].iter().chain(arguments))?;
+        match cli.command {
+            Command::Run(args) => Ok(args),
+            other => panic!("not a run: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_contract_of_run_is_understood() {
+        let args =
+            run(&["p", "--cycles", "10", "--for", "1m30s", "--until", "a > 1", "--set", "G.x := 3", "--set", "s='a=b'", "--print", "G.x"])
+                .unwrap();
+        assert_eq!((args.cycles, args.duration), (Some(10), Some(Time::from_millis(90_000))));
+        assert_eq!(args.set, [("G.x".to_string(), "3".to_string()), ("s".to_string(), "'a=b'".to_string())]);
+        assert_eq!(args.engine, EngineKind::Jit);
+        let args = run(&["p", "q", "--speed", "2.5", "--trace", "t.csv", "--record", "a,b", "--json", "--engine", "interp"]).unwrap();
+        assert_eq!((args.speed, args.record.len(), args.paths.len()), (Some(Speed::Factor(2.5)), 2, 2));
+    }
+
+    #[test]
+    fn wrong_usage_is_refused_with_code_2() {
+        let wrong: [&[&str]; 8] = [
+            &[],
+            &["p", "--cycles", "-1"],
+            &["p", "--for", "10"],
+            &["p", "--speed", "fast"],
+            &["p", "--speed", "0"],
+            &["p", "--set", "x"],
+            &["p", "--trace", "t.csv"],
+            &["p", "--engine", "vm"],
+        ];
+        for arguments in wrong {
+            assert_eq!(run(arguments).expect_err("wrong").exit_code(), 2, "{arguments:?}");
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! The live line: what the manifest wants shown, on one line of the terminal, ten times a second.
+
+use crate::clock;
+use crate::machine::Machine;
+use crate::values;
+use std::io::{IsTerminal, Write};
+
+/// Nanoseconds between two lines.
+const PERIOD: u64 = 100_000_000;
+
+/// The line, if standard error is a terminal.
+pub(super) struct Live {
+    on: bool,
+    next: u64,
+    shown: bool,
+    looks: u32,
+}
+
+impl Live {
+    pub(super) fn new(wanted: bool) -> Self {
+        Self { on: wanted && std::io::stderr().is_terminal(), next: 0, shown: false, looks: 0 }
+    }
+
+    /// Draws the line anew when it is time. The clock is asked every 16th scan only.
+    pub(super) fn show(&mut self, machine: &Machine) {
+        self.looks = self.looks.wrapping_add(1);
+        if !self.on || self.looks % 16 != 1 {
+            return;
+        }
+        let now = clock::nanoseconds();
+        if now < self.next {
+            return;
+        }
+        self.next = now + PERIOD;
+        self.shown = true;
+        let colour = anstream::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        let (dim, plain) = if colour { ("\x1b[2m", "\x1b[0m") } else { ("", "") };
+        // A terminal that cannot be written to is no reason to stop a machine.
+        let _ = write!(std::io::stderr(), "\r\x1b[K{dim}{:>9.3} s{plain}  {}", machine.now().seconds(), line(machine, width()));
+        let _ = std::io::stderr().flush();
+    }
+
+    /// Takes the line away.
+    pub(super) fn clear(&mut self) {
+        if std::mem::take(&mut self.shown) {
+            let _ = write!(std::io::stderr(), "\r\x1b[K");
+        }
+    }
+}
+
+/// Characters that fit behind the time.
+fn width() -> usize {
+    let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok()).unwrap_or(100usize);
+    columns.saturating_sub(15).max(20)
+}
+
+fn line(machine: &Machine, width: usize) -> String {
+    let types = &machine.program().types;
+    let items = machine.view().live.iter().map(|shown| {
+        let value = values::for_people(types, shown.place, machine.bytes(shown.place), shown.item.digits, shown.item.scale);
+        [shown.item.label.as_str(), &value, shown.item.unit.as_str()]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ")
+    });
+    let text = items.collect::<Vec<_>>().join("   ");
+    text.chars().filter(|c| !c.is_control()).take(width).collect()
+}

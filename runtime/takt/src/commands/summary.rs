@@ -1,0 +1,102 @@
+//! What is said at the end of a run: a short table for people, one object for tools.
+
+use super::run::Over;
+use crate::clock;
+use crate::language::{self, Language, Word};
+use crate::machine::{End, Machine};
+use crate::project::Project;
+use crate::values;
+use serde_json::{Value, json};
+use takt_engine::{FaultRecord, Frame};
+use takt_ir::Place;
+
+/// The object of `--json` (DESIGN §9).
+pub(super) fn to_json(machine: &Machine, printed: &[(String, Place)]) -> Value {
+    let times = &machine.statistics().scan_ns;
+    let types = &machine.program().types;
+    let values: serde_json::Map<String, Value> =
+        printed.iter().map(|(name, place)| (name.clone(), values::to_json(types, place.ty, machine.bytes(*place)))).collect();
+    json!({
+        "schema": 1,
+        "cycles": machine.cycles(),
+        "time_ns": machine.elapsed().0,
+        "scan_ns": { "mean": times.mean().round() as u64, "p50": times.percentile(0.5), "p99": times.percentile(0.99), "max": times.max() },
+        "fault": machine.fault().filter(|record| record.fault != takt_abi::Fault::Stopped).map(fault),
+        "values": values,
+    })
+}
+
+fn fault(record: &FaultRecord) -> Value {
+    let frame = |frame: &Frame| json!({ "file": frame.file, "line": frame.line, "column": frame.column, "body": frame.body });
+    json!({
+        "code": record.fault.name(), "message": record.fault.to_string(), "file": record.place.file, "line": record.place.line,
+        "task": record.task, "stack": record.stack.iter().map(frame).collect::<Vec<_>>(),
+    })
+}
+
+/// The table for people, on standard error; with `--json` only what went wrong.
+pub(super) fn tell(project: &Project, machine: &Machine, over: &Over, json: bool) {
+    let language = language::of_environment();
+    if let Some(why) = why(over, language) {
+        anstream::eprintln!("{why}");
+    }
+    if let (Over::End(End::Fault), Some(record)) = (over, machine.fault()) {
+        anstream::eprintln!("\x1b[1;31m{}\x1b[0m: {record}", Word::Fault.text(language));
+    }
+    if json {
+        return;
+    }
+    let rows = rows(machine, over, language);
+    let wide = rows.iter().map(|(label, _)| cells(label)).max().unwrap_or(0);
+    anstream::eprintln!("\x1b[1m{}\x1b[0m", project.name);
+    for (label, value) in rows {
+        anstream::eprintln!("  {label}{}  {value}", " ".repeat(wide - cells(&label)));
+    }
+}
+
+fn why(over: &Over, language: Language) -> Option<String> {
+    match over {
+        Over::Stopped => Some(Word::Stopped.text(language).into()),
+        Over::End(End::TimedOut { waiting_for }) => {
+            Some(format!("{}; {} `{waiting_for}`", Word::TimedOut.text(language), Word::WaitingFor.text(language)))
+        }
+        Over::End(End::Condition { text, fault }) => Some(format!("{}: `{text}`: {fault}", Word::Error.text(language))),
+        _ => None,
+    }
+}
+
+fn rows(machine: &Machine, over: &Over, language: Language) -> Vec<(String, String)> {
+    let mut rows = Vec::new();
+    let mut row = |word: Word, value: String| rows.push((word.text(language).to_string(), value));
+    let statistics = machine.statistics();
+    let times = &statistics.scan_ns;
+    row(Word::Cycles, machine.cycles().to_string());
+    let wall = clock::nanoseconds() as f64 * 1e-9;
+    let factor = machine.elapsed().seconds() / wall.max(1e-9);
+    row(Word::MachineTime, format!("{:.3} s ({factor:.1} {})", machine.elapsed().seconds(), Word::RealTimeFactor.text(language)));
+    if times.count() > 0 {
+        let us = |ns: u64| ns as f64 * 1e-3;
+        row(
+            Word::ScanTime,
+            format!("p50 {:.1} µs, p99 {:.1} µs, max {:.1} µs", us(times.percentile(0.5)), us(times.percentile(0.99)), us(times.max())),
+        );
+    }
+    if statistics.overruns > 0 {
+        row(Word::Overruns, statistics.overruns.to_string());
+    }
+    let fault = if matches!(over, Over::End(End::Fault)) { machine.fault().map(|record| record.fault.to_string()) } else { None };
+    row(Word::Fault, fault.unwrap_or_else(|| Word::NoFault.text(language).into()));
+    let types = &machine.program().types;
+    for shown in &machine.view().report {
+        let value = values::for_people(types, shown.place, machine.bytes(shown.place), shown.item.digits, shown.item.scale);
+        let unit = if shown.item.unit.is_empty() { String::new() } else { format!(" {}", shown.item.unit) };
+        let label = if shown.item.label.is_empty() { &shown.item.value.value } else { &shown.item.label };
+        rows.push((label.clone(), format!("{value}{unit}")));
+    }
+    rows
+}
+
+/// Cells of a terminal that a text takes: most of what is not Latin is two wide.
+fn cells(text: &str) -> usize {
+    text.chars().map(|c| if (c as u32) < 0x1100 { 1 } else { 2 }).sum()
+}

@@ -1,0 +1,77 @@
+//! The tool's own words, in English and Chinese.
+//!
+//! The language follows `LC_ALL`, `LC_MESSAGES` and `LANG`, in this order. Messages of the compiler and the manifest are English.
+
+/// A language of the tool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Language {
+    /// English.
+    #[default]
+    English,
+    /// 中文.
+    Chinese,
+}
+
+/// The language of the environment.
+pub fn of_environment() -> Language {
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    of_locale(&set("LC_ALL").or_else(|| set("LC_MESSAGES")).or_else(|| set("LANG")).unwrap_or_default())
+}
+
+/// The language of a locale like `zh_CN.UTF-8`.
+pub fn of_locale(locale: &str) -> Language {
+    if locale.starts_with("zh") { Language::Chinese } else { Language::English }
+}
+
+macro_rules! words {
+    ($($name:ident $english:literal $chinese:literal,)*) => {
+        /// What the tool says of itself.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Word { $(#[doc = $english] $name,)* }
+        impl Word {
+            /// The text.
+            pub fn text(self, language: Language) -> &'static str {
+                match (self, language) {
+                    $((Self::$name, Language::English) => $english, (Self::$name, Language::Chinese) => $chinese,)*
+                }
+            }
+        }
+    };
+}
+words! {
+    Error "error" "错误",
+    Warning "warning" "警告",
+    Errors "errors" "个错误",
+    Warnings "warnings" "个警告",
+    NoFindings "no findings" "没有发现问题",
+    Help "help" "帮助",
+    Cycles "Scans" "扫描周期",
+    MachineTime "Machine time" "机器时间",
+    ScanTime "Scan time" "扫描时间",
+    RealTimeFactor "times real time" "倍实时",
+    Overruns "Overruns" "超时",
+    Fault "Fault" "故障",
+    NoFault "none" "无",
+    Demonstration "A demonstration: as fast as possible. Watch it in real time with `--speed real`." "演示:以最快速度运行。用 `--speed real` 可实时观看。",
+    Stopped "Stopped on request." "已按请求停止。",
+    TimedOut "The demonstration did not end in its time" "演示未在规定时间内结束",
+    WaitingFor "it waited for" "正在等待",
+    ReadAs "was read as" "读取编码为",
+    PlotWritten "Plot" "曲线图",
+    TraceWritten "Trace" "记录",
+    Running "running" "运行",
+    DefectOfTakt "This is a defect of Takt. Please report it with the program that shows it." "这是 Takt 的缺陷,请附上程序报告。",
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_locale_decides() {
+        assert_eq!(of_locale("zh_CN.UTF-8"), Language::Chinese);
+        assert_eq!(of_locale("de_DE.UTF-8"), Language::English);
+        assert_eq!(of_locale(""), Language::English);
+        assert_eq!(Word::Fault.text(Language::Chinese), "故障");
+    }
+}

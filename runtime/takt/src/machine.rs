@@ -1,0 +1,438 @@
+//! A machine that runs: compiled program, engine, simulated bus and the operator's script.
+//!
+//! [`Machine::new`] binds a project; [`Machine::step`] runs what is due next. Nothing here asks what time it is: machine time goes from release to release,
+//! so a run is the same run every time. Pacing it to the wall clock is the command's business.
+
+mod binding;
+mod bus;
+mod operator;
+
+pub use binding::{PlotPlaces, Shown, View};
+pub use bus::Bus;
+
+use crate::host;
+use crate::manifest::{Located, ManifestError, ManifestErrors};
+use crate::program::{Compiled, Condition};
+use crate::project::Project;
+use crate::values;
+use operator::Operator;
+use std::fmt;
+use std::sync::Arc;
+use takt_abi::{Fault, Time};
+use takt_engine::{Clock, Engine, ExecutorKind, FaultRecord, LoadError};
+use takt_ir::{BodyId, Place, Program, SymbolError, Trigger, ValueError};
+
+/// How a machine is to be run.
+#[derive(Debug, Clone, Default)]
+pub struct Setup {
+    /// Machine code or interpreter.
+    pub executor: ExecutorKind,
+    /// Virtual, or the machine's.
+    pub clock: Clock,
+    /// Nanoseconds of some clock, for the statistics of execution times.
+    pub stopwatch: Option<fn() -> u64>,
+    /// An ST condition that ends the run.
+    pub until: Option<String>,
+}
+
+/// Why a machine cannot be built.
+#[derive(Debug)]
+pub enum BuildError {
+    /// The sources or conditions have errors.
+    Program(Box<Compiled>),
+    /// The manifest names what the program does not have.
+    Manifest(ManifestErrors),
+    /// The engine refuses the program.
+    Load(LoadError),
+    /// The bus cannot be opened.
+    Bus(String),
+    /// The file service cannot be started.
+    Files(std::io::Error),
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Program(compiled) => {
+                let (errors, _) = compiled.counts();
+                write!(f, "the program has {errors} errors")?;
+                for diagnostic in &compiled.diagnostics {
+                    let spot = compiled.locate(diagnostic.span);
+                    let place = crate::manifest::Place::of(spot.text, spot.range.start);
+                    write!(f, "\n{}:{}:{}: {} {}", spot.file, place.line, place.column, diagnostic.code.text(), diagnostic.message)?;
+                }
+                Ok(())
+            }
+            Self::Manifest(errors) => write!(f, "{errors}"),
+            Self::Load(error) => write!(f, "{error}"),
+            Self::Bus(message) => write!(f, "the simulated bus: {message}"),
+            Self::Files(error) => write!(f, "the file service: {error}"),
+        }
+    }
+}
+impl std::error::Error for BuildError {}
+
+/// Why a variable cannot be read or written from outside.
+#[derive(Debug, Clone, PartialEq)]
+pub enum VariableError {
+    /// There is no such variable.
+    Name(SymbolError),
+    /// The text is no value of its type.
+    Value(ValueError),
+    /// It has another type than asked for.
+    Kind {
+        /// The variable.
+        path: String,
+        /// Its type.
+        found: String,
+        /// What was asked for.
+        expected: &'static str,
+    },
+    /// It is a constant.
+    Constant(String),
+}
+
+impl fmt::Display for VariableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(error) => write!(f, "{error}"),
+            Self::Value(error) => write!(f, "{error}"),
+            Self::Kind { path, found, expected } => write!(f, "`{path}` is `{found}`, expected {expected}"),
+            Self::Constant(path) => write!(f, "`{path}` is a constant"),
+        }
+    }
+}
+impl std::error::Error for VariableError {}
+
+/// Why a run is over.
+#[derive(Debug, Clone, PartialEq)]
+pub enum End {
+    /// The condition of `--until`.
+    Until,
+    /// The manifest says that the demonstration is over.
+    Done,
+    /// It was not over in its time; with what the operator waited for.
+    TimedOut {
+        /// The condition, as it stands in the manifest.
+        waiting_for: String,
+    },
+    /// The program faulted; see [`Machine::fault`].
+    Fault,
+    /// A condition cannot be evaluated.
+    Condition {
+        /// The condition.
+        text: String,
+        /// Why.
+        fault: Fault,
+    },
+}
+
+/// A condition with its text.
+#[derive(Debug, Clone)]
+pub(crate) struct Watch {
+    text: String,
+    body: BodyId,
+}
+
+/// A machine.
+#[derive(Debug)]
+pub struct Machine {
+    engine: Engine,
+    program: Arc<Program>,
+    bus: Bus,
+    view: View,
+    operator: Operator,
+    done: Option<Watch>,
+    timeout: Option<Time>,
+    plotted: Option<Watch>,
+    until: Option<Watch>,
+    fastest: usize,
+    compiled: Compiled,
+}
+
+impl Machine {
+    /// Compiles and binds a project.
+    pub fn new(project: &Project, setup: Setup) -> Result<Self, BuildError> {
+        let mut conditions = Conditions::default();
+        let simulation = project.manifest.simulation.as_ref();
+        let done = conditions.add(simulation.and_then(|s| s.done.as_ref()));
+        let steps = simulation.map_or(&[][..], |s| &s.operator);
+        let waits: Vec<_> = steps.iter().map(|step| conditions.add(step.when.as_ref())).collect();
+        let plotted = conditions.add(project.manifest.plot.as_ref().and_then(|plot| plot.only.as_ref()));
+        let until = setup.until.map(|text| conditions.push(Condition { text, span: None }));
+        let mut compiled = crate::program::compile(project, &conditions.list);
+        let Some(program) = compiled.program.take() else { return Err(BuildError::Program(Box::new(compiled))) };
+        let watch = |index: Option<usize>| index.map(|i| Watch { text: conditions.list[i].text.clone(), body: compiled.conditions[i] });
+
+        let bus = bus::open(&project.manifest, bus_period(project, &program)).map_err(BuildError::Bus)?;
+        let bound = binding::bind(project, &program, &bus.channels).map_err(BuildError::Manifest)?;
+        let operator = Operator::new(bound.steps, waits.into_iter().map(watch).collect());
+        let options = takt_engine::Options {
+            executor: setup.executor,
+            bus_task: project.manifest.bus_task.as_ref().map(|task| task.value.clone()),
+            host: Box::new(host::open(project.root.clone()).map_err(BuildError::Files)?),
+            axes: bound.axes,
+            wires: bound.wires,
+            clock: setup.clock,
+            stopwatch: setup.stopwatch,
+            ..takt_engine::Options::default()
+        };
+        let (driver, bus) = bus.split();
+        let engine = takt_engine::load(program.clone(), options, driver).map_err(|error| load_error(project, error))?;
+        let fastest = fastest_task(&program).unwrap_or(engine.bus_task());
+        Ok(Self {
+            fastest,
+            done: watch(done),
+            timeout: simulation.and_then(|s| s.timeout),
+            plotted: watch(plotted),
+            until: watch(until),
+            engine,
+            program,
+            bus,
+            view: bound.view,
+            operator,
+            compiled,
+        })
+    }
+
+    /// Lets the operator act, then runs what is due next; false if the fastest task was not. Under a real clock pass its time.
+    pub fn step_at(&mut self, now: Time) -> bool {
+        self.operator.act(&mut self.engine, &mut self.bus, now);
+        let before = self.cycles();
+        self.engine.step(now);
+        self.cycles() > before
+    }
+
+    /// The same in machine time, from release to release.
+    pub fn step(&mut self) -> bool {
+        self.step_at(self.engine.next_release())
+    }
+
+    /// Whether the run is over by itself: fault, `--until`, end of the demonstration, or its time-out.
+    pub fn ended(&mut self) -> Option<End> {
+        if self.engine.fault().is_some() {
+            return Some(End::Fault);
+        }
+        for (watch, end) in [(self.until.clone(), End::Until), (self.done.clone(), End::Done)] {
+            let Some(watch) = watch else { continue };
+            match self.engine.evaluate(watch.body) {
+                Ok(0) => {}
+                Ok(_) => return Some(end),
+                Err(fault) => return Some(End::Condition { text: watch.text, fault }),
+            }
+        }
+        if let Some((text, fault)) = self.operator.failed() {
+            return Some(End::Condition { text: text.into(), fault });
+        }
+        let late = self.timeout.is_some_and(|timeout| self.elapsed() >= timeout);
+        let waiting_for = || self.operator.waiting_for().or(self.done.as_ref().map(|done| done.text.as_str())).unwrap_or("?").to_string();
+        late.then(|| End::TimedOut { waiting_for: waiting_for() })
+    }
+
+    /// Steps until the run is over by itself or `limit` of machine time has passed; `seen` looks at the machine after each scan of the fastest task.
+    pub fn run(&mut self, limit: Time, mut seen: impl FnMut(&mut Self)) -> Option<End> {
+        while self.elapsed() < limit {
+            if self.step() {
+                seen(self);
+            }
+            if let Some(end) = self.ended() {
+                return Some(end);
+            }
+        }
+        None
+    }
+
+    /// Steps until `condition` holds, at most for `limit` of machine time; whether it did.
+    pub fn run_until(&mut self, limit: Time, mut condition: impl FnMut(&mut Self) -> bool) -> bool {
+        let end = Time(self.elapsed().0.saturating_add(limit.0));
+        while self.elapsed() < end {
+            self.step();
+            if condition(self) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Takes the script away: whoever drives the machine is the operator.
+    pub fn dismiss_operator(&mut self) {
+        self.operator = Operator::default();
+        (self.done, self.timeout) = (None, None);
+    }
+
+    /// Machine time that has passed: the scans so far and the rest of their periods.
+    pub fn elapsed(&self) -> Time {
+        if self.cycles() == 0 { Time(0) } else { self.engine.next_release() }
+    }
+
+    /// Start of the last scan.
+    pub fn now(&self) -> Time {
+        self.engine.now()
+    }
+
+    /// Scans of the fastest task.
+    pub fn cycles(&self) -> u64 {
+        self.engine.statistics(self.fastest).cycles
+    }
+
+    /// Execution times of the fastest task.
+    pub fn statistics(&self) -> &takt_engine::TaskStatistics {
+        self.engine.statistics(self.fastest)
+    }
+
+    /// The fault that stopped the program.
+    pub fn fault(&self) -> Option<&FaultRecord> {
+        self.engine.fault()
+    }
+
+    /// Clears a fault and starts the program with its initial values.
+    pub fn reset(&mut self) -> Result<(), Box<FaultRecord>> {
+        self.engine.reset()
+    }
+
+    /// The engine.
+    pub fn engine(&mut self) -> &mut Engine {
+        &mut self.engine
+    }
+
+    /// The simulated bus: inputs, drives that fail, switches that stick.
+    pub fn bus(&mut self) -> &mut Bus {
+        &mut self.bus
+    }
+
+    /// The program.
+    pub fn program(&self) -> &Arc<Program> {
+        &self.program
+    }
+
+    /// What the compiler said (warnings, when there is a machine).
+    pub fn compiled(&self) -> &Compiled {
+        &self.compiled
+    }
+
+    /// What the manifest wants shown.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// Whether the manifest says when the demonstration is over.
+    pub fn is_demonstration(&self) -> bool {
+        self.done.is_some()
+    }
+
+    /// Whether this scan belongs to the plot.
+    pub fn is_plotted(&mut self) -> bool {
+        let Some(watch) = &self.plotted else { return true };
+        self.engine.evaluate(watch.body).is_ok_and(|value| value != 0)
+    }
+
+    /// The place of a variable.
+    pub fn place(&self, path: &str) -> Result<Place, VariableError> {
+        takt_ir::resolve(&self.program, path).map_err(VariableError::Name)
+    }
+
+    /// The bytes of a variable.
+    pub fn bytes(&self, place: Place) -> &[u8] {
+        self.engine.read(place)
+    }
+
+    /// A number, BOOL as 0 or 1; NaN if it is none.
+    pub fn number_at(&self, place: Place) -> f64 {
+        values::to_number(&self.program.types, place.ty, self.bytes(place)).unwrap_or(f64::NAN)
+    }
+
+    /// A variable as a number, BOOL as 0 or 1.
+    pub fn number(&self, path: &str) -> Result<f64, VariableError> {
+        let place = self.place(path)?;
+        values::to_number(&self.program.types, place.ty, self.bytes(place)).ok_or_else(|| self.kind(path, place, "a number"))
+    }
+
+    /// A BOOL.
+    pub fn boolean(&self, path: &str) -> Result<bool, VariableError> {
+        Ok(self.number(path)? != 0.0)
+    }
+
+    /// A STRING, without quotes.
+    pub fn string(&self, path: &str) -> Result<String, VariableError> {
+        let place = self.place(path)?;
+        match takt_ir::read_scalar(&self.program.types, place.ty, self.bytes(place)) {
+            Some(takt_ir::Scalar::Text(text)) => Ok(text),
+            _ => Err(self.kind(path, place, "a STRING")),
+        }
+    }
+
+    fn kind(&self, path: &str, place: Place, expected: &'static str) -> VariableError {
+        VariableError::Kind { path: path.into(), found: self.program.types.name(place.ty), expected }
+    }
+
+    /// A variable as an ST literal.
+    pub fn literal(&self, path: &str) -> Result<String, VariableError> {
+        let place = self.place(path)?;
+        Ok(takt_ir::format_value(&self.program.types, place.ty, self.bytes(place)))
+    }
+
+    /// Writes a variable once, between scans; `value` is an ST literal.
+    pub fn set(&mut self, path: &str, value: &str) -> Result<(), VariableError> {
+        let place = self.place(path)?;
+        if binding::is_constant(&self.program, place) {
+            return Err(VariableError::Constant(path.into()));
+        }
+        let bytes = takt_ir::parse_value(&self.program.types, place.ty, value).map_err(VariableError::Value)?;
+        self.engine.write(place, &bytes).map_err(|_| self.kind(path, place, "another size"))
+    }
+}
+
+#[derive(Default)]
+struct Conditions {
+    list: Vec<Condition>,
+}
+
+impl Conditions {
+    fn push(&mut self, condition: Condition) -> usize {
+        self.list.push(condition);
+        self.list.len() - 1
+    }
+    fn add(&mut self, text: Option<&Located<String>>) -> Option<usize> {
+        text.map(|text| self.push(Condition::of_manifest(text)))
+    }
+}
+
+/// Period of the task that owns the bus; 10 ms if it has none.
+fn bus_period(project: &Project, program: &Program) -> Time {
+    let named = project
+        .manifest
+        .bus_task
+        .as_ref()
+        .and_then(|name| program.tasks.iter().position(|task| task.name.eq_ignore_ascii_case(&name.value)));
+    match named.or_else(|| fastest_task(program)).map(|i| program.tasks[i].trigger) {
+        Some(Trigger::Cyclic(period)) => Time(period),
+        _ => Time::from_millis(10),
+    }
+}
+
+fn fastest_task(program: &Program) -> Option<usize> {
+    let cyclic = program.tasks.iter().enumerate().filter_map(|(i, task)| match task.trigger {
+        Trigger::Cyclic(period) => Some((period, i)),
+        _ => None,
+    });
+    cyclic.min().map(|(_, i)| i)
+}
+
+/// A refusal of the engine, shown at the place in the manifest that it is about.
+fn load_error(project: &Project, error: LoadError) -> BuildError {
+    let manifest = &project.manifest;
+    let (span, message) = match &error {
+        LoadError::BusTask { .. } => (manifest.bus_task.as_ref().map(|task| task.span.clone()), error.to_string()),
+        LoadError::Axis { name, problem } => {
+            (manifest.axes.iter().find(|axis| axis.name.value == *name).map(|axis| axis.name.span.clone()), problem.to_string())
+        }
+        LoadError::Wire { name, problem } => {
+            (manifest.wires.iter().find(|wire| wire.variable.value == *name).map(|wire| wire.variable.span.clone()), problem.to_string())
+        }
+        _ => (None, String::new()),
+    };
+    match span {
+        Some(span) => BuildError::Manifest(project.errors(vec![ManifestError { span, message, help: String::new() }])),
+        None => BuildError::Load(error),
+    }
+}
