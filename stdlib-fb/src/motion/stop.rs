@@ -9,7 +9,8 @@ function_block! {
     ///
     /// `Deceleration` must be positive; larger values than the axis' limits are cut to them, a `Jerk` of 0 means the axis' own. A homing under way is
     /// ended too. Errors: SMC_FB_CALLED_FROM_WRONG_TASK, SMC_REGULATOR_OR_START_NOT_SET (no power), SMC_MS_AXIS_IN_ERRORSTOP,
-    /// SMC_AXIS_NOT_READY_FOR_MOTION (another MC_Stop is stopping the axis), SMC_MS_INVALID_ACCDEC_VALUES, SMC_AXIS_ERROR_DURING_MOTION.
+    /// SMC_AXIS_NOT_READY_FOR_MOTION (another MC_Stop is stopping the axis), SMC_MS_INVALID_ACCDEC_VALUES, SMC_AXIS_ERROR_DURING_MOTION,
+    /// SMC_FB_ACTIVE_AXIS_DISABLED (the drive's quick stop has taken the axis away).
     pub block MC_Stop as Stop {
         input {
             /// Rising edge: stop. While TRUE, the axis takes no command.
@@ -36,6 +37,9 @@ function_block! {
         fb.command.call(fb.Axis, fb.Execute, order(Goal::Stop, fb.Deceleration, fb.Jerk, BufferMode::Aborting), cx)?;
         let c = &fb.command;
         (fb.Done, fb.Busy, fb.Error, fb.ErrorID) = (c.done, c.busy(), c.error, c.id);
+        if c.aborted.get() {
+            (fb.Error, fb.ErrorID) = (Bool::TRUE, SmcError::SMC_FB_ACTIVE_AXIS_DISABLED);
+        }
         Ok(())
     }
 }
@@ -172,6 +176,17 @@ mod tests {
         assert_eq!(error(eager, &mut rig), SmcError::SMC_NO_ERROR);
         rig.change(|a| a.nAxisState = AxisState::errorstop);
         assert_eq!(error(&mut stop(), &mut rig), SmcError::SMC_MS_AXIS_IN_ERRORSTOP);
+    }
+
+    #[test]
+    fn a_stop_that_loses_the_axis_to_a_quick_stop_is_an_error() {
+        let (mut rig, _) = running();
+        let mut fb = stop();
+        rig.call(2, |cx| fb.cycle(cx));
+        rig.next();
+        rig.change(|a| (a.nCommandedBy, a.bDriveStartRealState) = (0, Bool::FALSE));
+        rig.call(2, |cx| fb.cycle(cx));
+        assert!(fb.Error.get() && fb.ErrorID == SmcError::SMC_FB_ACTIVE_AXIS_DISABLED && !fb.Busy.get() && !fb.Done.get());
     }
 
     #[test]
