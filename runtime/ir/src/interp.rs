@@ -118,9 +118,11 @@ impl<'a> Run<'a> {
         }
     }
 
+    #[inline(always)]
     fn get(&self, local: Local) -> u64 {
         self.own.words[self.base + local.0 as usize]
     }
+    #[inline(always)]
     fn set(&mut self, local: Local, word: u64) {
         self.own.words[self.base + local.0 as usize] = word;
     }
@@ -128,6 +130,7 @@ impl<'a> Run<'a> {
         self.ctx.fail(fault, site.0)
     }
     /// The offset of an access.
+    #[inline(always)]
     fn place(&self, base: Base, offset: u32) -> u64 {
         let start = match base {
             Base::Image => 0,
@@ -208,6 +211,7 @@ impl<'a> Run<'a> {
         }))
     }
 
+    #[inline(always)]
     fn step(&mut self, inst: &Inst) -> Result<(), u32> {
         match inst {
             Inst::Const { dst, value } => self.set(
@@ -258,6 +262,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    #[inline]
     fn op(&mut self, op: Op, dst: Local, args: &[Local], site: SiteId) -> Result<(), u32> {
         let mut words = [0; 3];
         for (word, arg) in words.iter_mut().zip(args) {
@@ -306,6 +311,7 @@ impl<'a> Run<'a> {
         }
         Ok(())
     }
+    #[inline]
     fn poll(&mut self, cost: u32, site: SiteId) -> Result<(), u32> {
         self.ctx.fuel = self.ctx.fuel.wrapping_sub(cost.into());
         if self.ctx.fuel >= 0 && self.ctx.flag.load(std::sync::atomic::Ordering::Relaxed) == 0 {
