@@ -177,7 +177,7 @@ pub enum Inst {
         /// Place.
         site: SiteId,
     },
-    /// Fault `Index` unless low ≤ index ≤ high (bounds of ARRAY[*] are locals).
+    /// Fault `Index` unless low ≤ index ≤ high (bounds of `ARRAY[*]` are locals).
     Check {
         /// Index.
         index: Local,

@@ -24,7 +24,7 @@ pub enum StructKind {
 pub struct Field {
     /// Name as declared.
     pub name: String,
-    /// Type. For a VAR_IN_OUT the type of the variable passed: 8 bytes hold its offset (24 for ARRAY[*]: offset, then per dimension two bounds).
+    /// Type. For a VAR_IN_OUT the type of the variable passed: 8 bytes hold its offset (24 for `ARRAY[*]`: offset, then per dimension two bounds).
     pub ty: TypeId,
     /// Bytes behind the start.
     pub offset: u32,
