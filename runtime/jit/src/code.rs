@@ -6,6 +6,7 @@ use crate::stack::StackUse;
 use cranelift_codegen::ir::{LibCall, Signature};
 use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
+use std::sync::Mutex;
 use takt_abi::{Context, Fault};
 use takt_ir::{BodyId, Op, Program, Ty, VerifyError};
 
@@ -64,7 +65,14 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
         site: body.entry_site.0,
     });
     let image_size = program.image_size.into();
-    Ok(Code { bodies: bodies.collect(), image_size, size, stack: StackUse::new(program, &frames), module: Some(module), _pool: pool })
+    Ok(Code {
+        bodies: bodies.collect(),
+        image_size,
+        size,
+        stack: StackUse::new(program, &frames),
+        module: Mutex::new(Some(module)),
+        _pool: pool,
+    })
 }
 
 /// What bodies that can be run from outside may return.
@@ -115,7 +123,8 @@ pub struct Code {
     image_size: u64,
     size: usize,
     stack: StackUse,
-    module: Option<JITModule>,
+    /// Owner of the memory; touched only to free it (the lock lets `Code` be shared between threads).
+    module: Mutex<Option<JITModule>>,
     /// Constants, at a fixed address; machine code reads them.
     _pool: Box<[u8]>,
 }
@@ -180,7 +189,7 @@ impl Code {
 
 impl Drop for Code {
     fn drop(&mut self) {
-        if let Some(module) = self.module.take() {
+        if let Some(module) = self.module.get_mut().ok().and_then(Option::take) {
             #[allow(unsafe_code, reason = "nobody else holds the addresses")]
             // SAFETY: addresses leave this value only for the length of a borrow of it, so none of its functions is running.
             unsafe {

@@ -6,7 +6,7 @@ use takt_ir::{
 };
 use takt_jit::{Code, Defect, compile_with};
 
-/// Bytes of the image; the upper half is the stack region.
+/// Bytes of the image; the third quarter is the stack region.
 pub const IMAGE: u32 = 4096;
 /// Where frames start.
 pub const STACK: u32 = 2048;
@@ -229,8 +229,7 @@ impl Writer {
 /// A program of these bodies; the first one is the task.
 pub fn program(bodies: Vec<Body>, natives: Vec<Native>, sites: u32) -> Program {
     let init = (0..1024u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
-    let task =
-        Task { name: "main".into(), trigger: Trigger::Cyclic(1_000_000), priority: 0, entry: BodyId(0), stack: (STACK, IMAGE - STACK) };
+    let task = Task { name: "main".into(), trigger: Trigger::Cyclic(1_000_000), priority: 0, entry: BodyId(0), stack: (STACK, 1024) };
     Program {
         bodies,
         natives,

@@ -85,7 +85,7 @@ pub fn random_program(seed: u64) -> Program {
     let shapes: Vec<Shape> = (0..count).map(|i| shape(&mut random, i, cycle)).collect();
     let (mut bodies, mut sites) = (Vec::new(), 0);
     for i in 0..count {
-        let budget = 6 + random.below(30);
+        let budget = 6 + random.below(40);
         let mut generator = Generator::new(&mut random, &shapes, i, sites, budget);
         generator.start();
         generator.statements(0);
@@ -142,6 +142,11 @@ impl<'a> Generator<'a> {
         }
     }
     fn finish(&mut self) {
+        for kind in 0..self.values.len() {
+            for local in self.values[kind].clone() {
+                self.observe(local);
+            }
+        }
         let term = self.return_();
         self.w.end(term);
     }
@@ -260,6 +265,18 @@ impl<'a> Generator<'a> {
             let width = self.random.pick(&[8, 16, 32, 64]);
             args[2] = self.w.int(width);
         }
+        if op == Op::ShrS && self.random.one_in(2) {
+            let (bits, distance) = (self.random.next(), 7 + self.random.below(57));
+            (args[0], args[1]) = (self.w.int(bits as i64), self.w.int(distance as i64));
+        }
+        if op == Op::Div && self.random.one_in(4) {
+            args = vec![self.w.int(i64::MIN), self.w.int(-1)];
+            let hidden = self.w.load(Mem::I64, VARIABLES);
+            let (zero, divisor, site) = (self.w.local(Ty::I64), self.w.local(Ty::I64), self.w.site());
+            self.w.push(Inst::Op { op: Op::Xor, dst: zero, args: vec![hidden, hidden], site });
+            self.w.push(Inst::Op { op: Op::Or, dst: divisor, args: vec![zero, args[1]], site });
+            args[1] = divisor;
+        }
         if op.faults() && !self.random.one_in(3) {
             let (one, divisor, site) = (self.w.int(1), self.w.local(Ty::I64), self.w.site());
             self.w.push(Inst::Op { op: Op::Or, dst: divisor, args: vec![args[1], one], site });
@@ -267,6 +284,19 @@ impl<'a> Generator<'a> {
         }
         let (dst, site) = (self.target(op.result()), self.w.site());
         self.w.push(Inst::Op { op, dst, args, site });
+        if !self.random.one_in(3) {
+            self.observe(dst);
+        }
+    }
+    /// Makes a value visible.
+    fn observe(&mut self, src: Local) {
+        let mem = match self.w.body.locals[src.0 as usize] {
+            Ty::F32 => Mem::F32,
+            Ty::F64 => Mem::F64,
+            _ => Mem::I64,
+        };
+        let offset = VARIABLES + 8 * self.random.below(128) as u32;
+        self.w.push(Inst::Store { src, mem, base: Base::Image, offset });
     }
     fn memory(&mut self) {
         for _ in 0..2 {
@@ -275,6 +305,9 @@ impl<'a> Generator<'a> {
             if self.random.one_in(2) {
                 let dst = self.target(mem.ty());
                 self.w.push(Inst::Load { dst, mem, base, offset });
+                if self.random.one_in(2) {
+                    self.observe(dst);
+                }
             } else {
                 let src = self.value(mem.ty());
                 self.w.push(Inst::Store { src, mem, base, offset });

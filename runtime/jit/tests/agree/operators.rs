@@ -74,7 +74,7 @@ fn operands(w: &mut Writer, op: Op, words: &[u64], hidden: bool, slot: u32, imag
     for (i, (ty, word)) in op.args().iter().zip(words).enumerate() {
         let offset = 32 + 24 * slot + 8 * i as u32;
         image[offset as usize..][..8].copy_from_slice(&word.to_le_bytes());
-        let constant = !hidden || (i == 2 && slot % 2 == 0);
+        let constant = !hidden || (i == 2 && slot.is_multiple_of(2));
         args.push(if constant { w.constant(*ty, *word) } else { w.load(mem(*ty), offset) });
     }
     args
