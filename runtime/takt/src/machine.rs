@@ -147,6 +147,8 @@ pub struct Machine {
     plotted: Option<Watch>,
     until: Option<Watch>,
     fastest: usize,
+    /// Time of the first scan.
+    started: Option<Time>,
     compiled: Compiled,
 }
 
@@ -182,6 +184,7 @@ impl Machine {
         let fastest = fastest_task(&program).unwrap_or(engine.bus_task());
         Ok(Self {
             fastest,
+            started: None,
             done: watch(done),
             timeout: simulation.and_then(|s| s.timeout),
             plotted: watch(plotted),
@@ -197,6 +200,7 @@ impl Machine {
 
     /// Lets the operator act, then runs what is due next; false if the fastest task was not. Under a real clock pass its time.
     pub fn step_at(&mut self, now: Time) -> bool {
+        self.started.get_or_insert(now);
         self.operator.act(&mut self.engine, &mut self.bus, now);
         let before = self.cycles();
         self.engine.step(now);
@@ -262,12 +266,16 @@ impl Machine {
 
     /// Machine time that has passed: the scans so far and the rest of their periods.
     pub fn elapsed(&self) -> Time {
-        if self.cycles() == 0 { Time(0) } else { self.engine.next_release() }
+        self.since_start(self.engine.next_release())
     }
 
-    /// Start of the last scan.
+    /// Start of the last scan; the first one is at 0.
     pub fn now(&self) -> Time {
-        self.engine.now()
+        self.since_start(self.engine.now())
+    }
+
+    fn since_start(&self, time: Time) -> Time {
+        self.started.map_or(Time(0), |started| Time(time.0 - started.0))
     }
 
     /// Scans of the fastest task.

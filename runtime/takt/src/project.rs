@@ -78,7 +78,7 @@ pub fn load_all(paths: &[PathBuf]) -> Result<Project, ProjectError> {
     if project.root.as_os_str().is_empty() {
         project.root = PathBuf::from(".");
     }
-    project.name = project.manifest.name.clone().unwrap_or_else(|| folder_name(&project.root));
+    project.name = project.manifest.name.clone().unwrap_or_else(|| name_of(paths, &project.root));
     project.sources = sources::read(&source_paths).map_err(ProjectError::Source)?;
     Ok(project)
 }
@@ -88,6 +88,16 @@ fn manifest_of(path: &Path) -> Option<PathBuf> {
         return Some(path.into());
     }
     Some(path.join(MANIFEST)).filter(|manifest| manifest.is_file())
+}
+
+/// The stem of the only file, else the name of the folder.
+fn name_of(paths: &[PathBuf], root: &Path) -> String {
+    match paths {
+        [file] if file.is_file() && file.file_name().is_some_and(|name| name != MANIFEST) => {
+            file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+        }
+        _ => folder_name(root),
+    }
 }
 
 fn folder_name(folder: &Path) -> String {

@@ -13,7 +13,10 @@ pub(super) fn execute(code: Option<&str>) -> Exit {
     };
     match codes().iter().find(|known| known.text().eq_ignore_ascii_case(code)) {
         Some(known) => {
-            println!("{}: {}", known.text(), known.meaning());
+            match takt_syntax::explain(known.text()) {
+                Some(page) => println!("{}", page.trim_end()),
+                None => println!("{}: {}", known.text(), known.meaning()),
+            }
             Exit::Good
         }
         None => {
