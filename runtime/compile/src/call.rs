@@ -1,7 +1,7 @@
 //! Calls: functions, blocks, programs, actions, native functions.
 
 use crate::body::Passing;
-use crate::expression::{Kind, Lowering, Operand, Thing};
+use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
 use crate::operator::Class;
 use crate::place::Place;
 use crate::scope::{Variable, key};
@@ -303,7 +303,8 @@ impl<'a> Lowering<'_, 'a> {
     /// The memory place of an argument for a VAR_IN_OUT, if it is a variable of the right type.
     fn variable_argument(&mut self, name: &str, ty: TypeId, operand: &Operand) -> Option<Place> {
         let place = match (&operand.kind, operand.fixed) {
-            (Kind::Place(place @ Place::Memory { .. }), None) => place.clone(),
+            // CODESYS programs hand an output such as SMC_ReadNCFile2.sentences on to the next block.
+            (Kind::Place(place @ Place::Memory { .. }), None | Some(BLOCK_OUTPUT)) => place.clone(),
             (Kind::Place(Place::Bits { .. }), None) => {
                 self.report(Code::BadArgument, operand.span, format!("a bit of a number cannot be passed to the VAR_IN_OUT `{name}`"));
                 return None;

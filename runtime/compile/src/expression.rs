@@ -46,6 +46,9 @@ impl Operand {
     }
 }
 
+/// Why an output is not written from outside.
+pub(crate) const BLOCK_OUTPUT: &str = "an output of a block";
+
 /// What a name or path means.
 pub(crate) enum Thing {
     Value(Operand),
@@ -508,7 +511,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
         let mut value = self.at(place.inside(field.offset), field.ty, span);
         value.fixed = operand.fixed;
         if kind == StructKind::Block && field.section == Section::Output {
-            value.fixed = Some("an output of a block");
+            value.fixed = Some(BLOCK_OUTPUT);
         }
         Thing::Value(value)
     }
