@@ -92,8 +92,10 @@ impl Lowering<'_, '_> {
             return self.constant(Value::Int(cut(v, into)), to, a.span);
         }
         let (fl, fh) = range(from);
-        self.maybe_lossy(&a, to, low <= fl && high >= fh);
-        self.explicit(a, to)
+        let fits = low <= fl && high >= fh;
+        self.maybe_lossy(&a, to, fits);
+        // The sum of two WORDs may exceed WORD until it is stored: what is computed in 64 bits stays uncut here.
+        Operand { ty: to, exact: a.exact && fits, flex: false, ..a }
     }
 
     /// Converts by the meaning of `X_TO_Y`; both types are scalar.
@@ -162,7 +164,9 @@ impl Lowering<'_, '_> {
         }
         let from = self.scalar(a.ty).map(range);
         if a.exact && a.ty != to && from.is_some_and(|(l, h)| range(into).0 <= l && range(into).1 >= h) {
-            return Operand { ty: to, ..a };
+            // read as what it is: its place is narrower than the type it becomes
+            let local = self.value(&a);
+            return self.exact(local, to, span);
         }
         let local = self.value(&a);
         let local = self.cut(local, into, span);
