@@ -13,6 +13,7 @@ mod documentation;
 mod expressions;
 mod literals;
 mod members;
+mod recovery;
 mod slips;
 mod statements;
 mod types;
@@ -80,6 +81,12 @@ struct Parser<'a> {
     open: Vec<Open>,
     /// The END_ of a block that was closed by a wrong one; if it follows, it is no second mistake.
     mistaken: Option<Kind>,
+    /// The END_ of a block whose first word was missing: the END_ of a block around it may be meant.
+    assumed: Option<Kind>,
+    /// The next word that begins or ends a block, and whether it is END_VAR.
+    end_var_ahead: (usize, bool),
+    /// What stands outside of units was complained of; the END_ behind it is no second mistake.
+    is_homeless: bool,
     /// VAR sections found among the statements of the present unit.
     late_vars: Vec<VarBlock>,
     diagnostics: Vec<Diagnostic>,
@@ -100,6 +107,9 @@ impl<'a> Parser<'a> {
             brackets: 0,
             open: Vec::new(),
             mistaken: None,
+            assumed: None,
+            end_var_ahead: (0, false),
+            is_homeless: false,
             late_vars: Vec::new(),
             diagnostics: Vec::new(),
             lines: OnceCell::new(),
@@ -191,7 +201,9 @@ impl<'a> Parser<'a> {
 
     /// A name, or a message that `what` is missing and an empty name.
     fn name(&mut self, what: &str) -> Name {
-        if self.kind().is_name() && !self.failed {
+        // A word at the start of a line in front of a name is a keyword: the name before it is missing.
+        let is_keyword = self.kind().is_contextual() && self.token().starts_line && self.peek(1).kind.is_name();
+        if self.kind().is_name() && !is_keyword && !self.failed {
             let token = self.bump();
             return self.name_of(token);
         }
@@ -289,9 +301,10 @@ impl<'a> Parser<'a> {
     }
 
     /// Takes the bracket that closes `open`. Where the line ends before it, it is taken as read.
-    fn close(&mut self, kind: Kind, open: Token) {
+    /// `true` if it was there.
+    fn close(&mut self, kind: Kind, open: Token) -> bool {
         if self.failed || self.eat(kind) {
-            return;
+            return !self.failed;
         }
         let next = self.token();
         let ends = next.starts_line || matches!(next.kind, Kind::Semi | Kind::Eof | Kind::Then | Kind::Do | Kind::Of | Kind::Assign);
@@ -306,6 +319,7 @@ impl<'a> Parser<'a> {
             self.brackets -= 1;
         }
         self.failed = !(ends && matches!(next.kind, Kind::Semi | Kind::Then | Kind::Do | Kind::Of));
+        false
     }
 
     // Depth.
@@ -345,11 +359,17 @@ impl<'a> Parser<'a> {
         let opener = self.text_of(open.start).to_ascii_uppercase();
         let span = if token.kind == Kind::Eof { self.gap() } else { self.span_of(token) };
         let mut diagnostic = Diagnostic::new(Code::MissingEnd, span, message);
-        diagnostic = diagnostic.note(self.span_of(open.start), format!("this `{opener}` in line {} is not closed", self.line_of(open.start)));
+        diagnostic =
+            diagnostic.note(self.span_of(open.start), format!("this `{opener}` in line {} is not closed", self.line_of(open.start)));
         if opener == "IF" && self.follows_else(open.start) {
-            diagnostic = diagnostic.help("`ELSE IF` opens a second IF with an END_IF of its own; a further branch of the same IF is `ELSIF`");
+            diagnostic =
+                diagnostic.help("`ELSE IF` opens a second IF with an END_IF of its own; a further branch of the same IF is `ELSIF`");
         }
-        if !(self.is_known_trouble() && token.kind == Kind::Eof) {
+        let is_forgiven = self.assumed == Some(open.end);
+        if is_forgiven {
+            self.assumed = None;
+        }
+        if !(is_forgiven || self.is_known_trouble() && token.kind == Kind::Eof) {
             self.failed = false;
             self.tell(diagnostic);
         }
@@ -359,6 +379,11 @@ impl<'a> Parser<'a> {
             self.bump();
         }
         token
+    }
+
+    /// Whether a word belongs to a block that is open.
+    fn closes_something(&self, word: Kind) -> bool {
+        self.open.iter().any(|open| closes(word, open.end))
     }
 
     fn follows_else(&self, token: Token) -> bool {
@@ -408,10 +433,7 @@ fn is_unit_end(kind: Kind) -> bool {
 /// Whether a keyword opens a VAR section.
 fn is_var(kind: Kind) -> bool {
     use Kind::*;
-    matches!(
-        kind,
-        Var | VarInput | VarOutput | VarInOut | VarTemp | VarStat | VarInst | VarGlobal | VarExternal | VarConfig | VarAccess
-    )
+    matches!(kind, Var | VarInput | VarOutput | VarInOut | VarTemp | VarStat | VarInst | VarGlobal | VarExternal | VarConfig | VarAccess)
 }
 
 #[cfg(test)]

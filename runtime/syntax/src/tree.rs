@@ -317,7 +317,7 @@ pub struct TypeExpr {
 pub enum TypeExprKind {
     /// `INT`, `Lib.TON`: the parts in order.
     Named(Vec<Name>),
-    /// STRING, STRING(n), STRING[n].
+    /// STRING, `STRING(n)`, `STRING[n]`.
     String(Option<Box<Expr>>),
     /// WSTRING.
     WString(Option<Box<Expr>>),
@@ -440,6 +440,7 @@ pub enum AssignOp {
 
 /// A statement.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "FOR is wide; a shape that is easy to match is worth more than its bytes")]
 pub enum StmtKind {
     /// `a := b := c;` is targets [a, b], value c.
     Assign {
@@ -625,9 +626,23 @@ pub enum UnaryOp {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are those of the standard")]
 pub enum BinaryOp {
-    Add, Sub, Mul, Div, Mod, Power,
-    Eq, Ne, Lt, Le, Gt, Ge,
-    And, Or, Xor, AndThen, OrElse,
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Mod,
+    Power,
+    Eq,
+    Ne,
+    Lt,
+    Le,
+    Gt,
+    Ge,
+    And,
+    Or,
+    Xor,
+    AndThen,
+    OrElse,
 }
 
 /// A literal.

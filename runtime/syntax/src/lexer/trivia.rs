@@ -3,8 +3,8 @@
 //! Both remember the token that follows them, so that the parser can give them to what they describe.
 
 use super::{Scanner, shorten};
-use crate::tree::Pragma;
 use crate::Code;
+use crate::tree::Pragma;
 
 /// A comment.
 #[derive(Debug, Clone, Copy)]
@@ -28,8 +28,28 @@ pub(crate) struct PlacedPragma {
 
 /// Words that a pragma may begin with. Braces with other contents may be blocks in the manner of C.
 const PRAGMA_WORDS: &[&str] = &[
-    "attribute", "region", "endregion", "warning", "info", "error", "text", "if", "elsif", "else", "end_if", "define", "undefine", "flag", "link",
-    "library", "analysis", "implicit", "p_open", "external", "inline", "section",
+    "attribute",
+    "region",
+    "endregion",
+    "warning",
+    "info",
+    "error",
+    "text",
+    "if",
+    "elsif",
+    "else",
+    "end_if",
+    "define",
+    "undefine",
+    "flag",
+    "link",
+    "library",
+    "analysis",
+    "implicit",
+    "p_open",
+    "external",
+    "inline",
+    "section",
 ];
 
 impl Scanner<'_> {
@@ -65,7 +85,11 @@ impl Scanner<'_> {
         if depth > 0 {
             let close = String::from_utf8_lossy(&close).into_owned();
             let message = format!("this comment is not closed by `{close}`");
-            let help = if depth > 1 { format!("comments nest: {depth} are open at the end of the file") } else { format!("write `{close}` behind its last word") };
+            let help = if depth > 1 {
+                format!("comments nest: {depth} are open at the end of the file")
+            } else {
+                format!("write `{close}` behind its last word")
+            };
             self.report_with_help(Code::UnterminatedComment, (start, start + 2), message, help);
             self.out.truncated = true;
         }

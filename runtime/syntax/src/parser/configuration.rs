@@ -21,11 +21,15 @@ impl Parser<'_> {
 
     /// What stands in a configuration or resource, up to its END_.
     fn parts(&mut self, out: &mut Configuration) {
+        let mut is_mended = false;
         loop {
             let brackets = self.brackets;
             let before = self.at;
             match self.kind() {
                 Kind::Eof | Kind::Function | Kind::FunctionBlock | Kind::Type => return,
+                Kind::EndResource if self.open.len() == 1 && is_mended => {
+                    self.bump();
+                }
                 kind if is_end(kind) => return,
                 Kind::VarGlobal | Kind::VarConfig | Kind::VarAccess => out.globals.extend(self.var_block()),
                 Kind::Resource if self.open.len() == 1 => self.resource(out),
@@ -38,6 +42,7 @@ impl Parser<'_> {
                 _ => self.unexpected_here("`RESOURCE`, `TASK`, `PROGRAM` or `VAR_GLOBAL`"),
             }
             if self.failed {
+                is_mended = true;
                 self.recover_part(brackets, before);
             }
         }
@@ -46,7 +51,9 @@ impl Parser<'_> {
     /// Whether PROGRAM begins a unit: the END_ of the configuration was forgotten.
     fn is_program_unit(&self) -> bool {
         let behind = self.peek(2);
-        self.peek(1).kind.is_name() && (behind.starts_line || behind.kind == Kind::Eof || super::is_var(behind.kind)) && behind.kind != Kind::With
+        self.peek(1).kind.is_name()
+            && (behind.starts_line || behind.kind == Kind::Eof || super::is_var(behind.kind))
+            && behind.kind != Kind::With
     }
 
     fn resource(&mut self, out: &mut Configuration) {

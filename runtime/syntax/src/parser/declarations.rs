@@ -1,6 +1,6 @@
 //! VAR sections and the declarations in them.
 
-use super::{Parser, is_end, is_var};
+use super::{Parser, is_end, is_statement_end, is_var};
 use crate::lexer::{Kind, Token};
 use crate::tree::{Name, VarBlock, VarDecl, VarKind};
 use crate::{Code, Diagnostic};
@@ -83,6 +83,7 @@ impl Parser<'_> {
             Eof | Function | FunctionBlock | Program | Type | Configuration => true,
             If | Case | For | While | Repeat | Exit | Return | Jmp | Elsif | Else | Until => true,
             _ if kind.is_contextual() => (self.starts_member() || self.starts_soft_unit()) && self.peek(2).kind != Colon,
+            _ if is_statement_end(kind) => self.closes_something(kind),
             _ => is_var(kind) || is_end(kind),
         }
     }
@@ -91,7 +92,8 @@ impl Parser<'_> {
     fn is_closed_ahead(&self) -> bool {
         let Some(end) = self.open.last().map(|open| open.end) else { return false };
         let rest = &self.lexed.tokens[self.at..];
-        let stop = rest.iter().find(|token| is_var(token.kind) || is_end(token.kind) || matches!(token.kind, Kind::Function | Kind::Program));
+        let stop =
+            rest.iter().find(|token| is_var(token.kind) || is_end(token.kind) || matches!(token.kind, Kind::Function | Kind::Program));
         stop.is_some_and(|token| token.kind == end)
     }
 
@@ -157,7 +159,8 @@ impl Parser<'_> {
             return;
         }
         let next = self.token();
-        let begins = next.starts_line || next.kind == Kind::Eof || is_end(next.kind) || next.kind.is_name() && self.peek(1).kind == Kind::Colon;
+        let begins =
+            next.starts_line || next.kind == Kind::Eof || is_end(next.kind) || next.kind.is_name() && self.peek(1).kind == Kind::Colon;
         if !begins || self.is_known_trouble() {
             return self.unexpected_here("`;`");
         }

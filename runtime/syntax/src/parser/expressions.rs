@@ -183,7 +183,7 @@ impl Parser<'_> {
                 self.tower(height, span, || ExprKind::Member(Box::new(base.expr), name))
             }
             _ => {
-                self.unexpected_here("the name of a member behind `.`");
+                self.missing_part("the name of a member behind `.`");
                 base
             }
         }
@@ -326,7 +326,7 @@ impl Parser<'_> {
             }
             kind if kind.is_name() => self.typed_name(),
             _ => {
-                self.missing_operand();
+                self.missing_part("an expression");
                 Tall::leaf(ExprKind::Error, self.gap())
             }
         }
@@ -365,24 +365,21 @@ impl Parser<'_> {
         inner
     }
 
-    fn missing_operand(&mut self) {
+    /// Fails for want of something that belongs to the line of the last token, if the present one begins another.
+    fn missing_part(&mut self, what: &str) {
         let token = self.token();
-        let at_gap = token.starts_line || matches!(token.kind, Kind::Semi | Kind::Eof);
-        if self.is_known_trouble() {
-            self.failed = true;
-            return;
+        if !self.is_known_trouble() {
+            let mut diagnostic = self.unexpected(what);
+            if token.starts_line || matches!(token.kind, Kind::Semi | Kind::Eof) {
+                diagnostic.span = self.gap();
+            }
+            if token.kind == Kind::LBracket {
+                diagnostic.help = Some("lists `[…]` stand only behind the `:=` of a declaration".to_owned());
+            }
+            self.tell(diagnostic);
         }
-        let mut diagnostic = self.unexpected("an expression");
-        if at_gap {
-            diagnostic.span = self.gap();
-        }
-        if token.kind == Kind::LBracket {
-            diagnostic.help = Some("lists `[…]` stand only behind the `:=` of a declaration".to_owned());
-        }
-        self.tell(diagnostic);
         self.failed = true;
     }
-
 }
 
 fn is_callable(kind: &ExprKind) -> bool {

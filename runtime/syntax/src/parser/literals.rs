@@ -24,7 +24,10 @@ impl Parser<'_> {
         };
         let kind = match result {
             Ok((ty, value)) => {
-                let ty = ty.map(|text| Name { span: crate::Span { end: span.start + text.len() as u32, ..span }, text: text.to_ascii_uppercase() });
+                let ty = ty.map(|text| Name {
+                    span: crate::Span { end: span.start + text.len() as u32, ..span },
+                    text: text.to_ascii_uppercase(),
+                });
                 ExprKind::Literal(Literal { ty, value })
             }
             Err((why, help)) => {
@@ -156,7 +159,13 @@ fn whole(digits: &str, base: u32) -> Result<i128, Fault> {
 
 /// Units of a duration, from the largest, in nanoseconds.
 const UNITS: &[(&str, i128)] = &[
-    ("d", 86_400_000_000_000), ("h", 3_600_000_000_000), ("m", 60_000_000_000), ("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1),
+    ("d", 86_400_000_000_000),
+    ("h", 3_600_000_000_000),
+    ("m", 60_000_000_000),
+    ("s", 1_000_000_000),
+    ("ms", 1_000_000),
+    ("us", 1000),
+    ("ns", 1),
 ];
 
 const DURATION_HELP: Option<&str> = Some("write for example `T#1h30m`, `T#250ms` or `T#1.5s`, the larger unit first");
@@ -261,7 +270,10 @@ fn date_and_time(body: &str) -> Result<i128, Fault> {
     Ok(i128::from(days) * 86_400_000_000_000 + i128::from(time))
 }
 
-const ESCAPE: Fault = ("has an unknown `$` escape", Some("known are $N $L $R $T $P $$ $' $\" and two (in \"…\" four) hexadecimal digits; a `$` itself is `$$`"));
+const ESCAPE: Fault = (
+    "has an unknown `$` escape",
+    Some("known are $N $L $R $T $P $$ $' $\" and two (in \"…\" four) hexadecimal digits; a `$` itself is `$$`"),
+);
 
 /// The character of `$N` and the like.
 fn escape(letter: u8) -> Option<u8> {
@@ -362,17 +374,54 @@ mod tests {
     fn numbers() {
         use LiteralValue::*;
         for (text, value) in [
-            ("0", Int(0)), ("1_000", Int(1000)), ("16#FF", Int(255)), ("2#1010_1010", Int(170)), ("8#17", Int(15)), ("10#9", Int(9)),
-            ("18446744073709551615", Int(u64::MAX.into())), ("INT#5", Int(5)), ("INT#-5", Int(-5)), ("WORD#16#ffff", Int(65535)),
-            ("DINT#2#11", Int(3)), ("1.5", Real(1.5)), ("1_0.2_5e-3", Real(0.01025)), ("1e3", Real(1000.0)), ("REAL#-1.5E2", Real(-150.0)),
-            ("LREAL#3", Real(3.0)), ("TRUE", Bool(true)), ("false", Bool(false)), ("BOOL#1", Bool(true)), ("bool#FALSE", Bool(false)),
+            ("0", Int(0)),
+            ("1_000", Int(1000)),
+            ("16#FF", Int(255)),
+            ("2#1010_1010", Int(170)),
+            ("8#17", Int(15)),
+            ("10#9", Int(9)),
+            ("18446744073709551615", Int(u64::MAX.into())),
+            ("INT#5", Int(5)),
+            ("INT#-5", Int(-5)),
+            ("WORD#16#ffff", Int(65535)),
+            ("DINT#2#11", Int(3)),
+            ("1.5", Real(1.5)),
+            ("1_0.2_5e-3", Real(0.01025)),
+            ("1e3", Real(1000.0)),
+            ("REAL#-1.5E2", Real(-150.0)),
+            ("LREAL#3", Real(3.0)),
+            ("TRUE", Bool(true)),
+            ("false", Bool(false)),
+            ("BOOL#1", Bool(true)),
+            ("bool#FALSE", Bool(false)),
             ("4.9e-324", Real(4.9e-324)),
         ] {
             check(text, value);
         }
         for text in [
-            "18446744073709551616", "16#10000000000000000", "2#12", "7#1", "16#", "1e999", "1__0", "1_", "INT#1.5", "INT#x", "BOOL#2", "BYTE#", "REAL#x",
-            "0x1F", "5ms", "1abc", "16#FG", "INT#-", "8#8", "16#_", "99999999999#1", "1.5e3e", "REAL#1.5x",
+            "18446744073709551616",
+            "16#10000000000000000",
+            "2#12",
+            "7#1",
+            "16#",
+            "1e999",
+            "1__0",
+            "1_",
+            "INT#1.5",
+            "INT#x",
+            "BOOL#2",
+            "BYTE#",
+            "REAL#x",
+            "0x1F",
+            "5ms",
+            "1abc",
+            "16#FG",
+            "INT#-",
+            "8#8",
+            "16#_",
+            "99999999999#1",
+            "1.5e3e",
+            "REAL#1.5x",
         ] {
             refused(text);
         }
@@ -414,7 +463,9 @@ mod tests {
         check("LTOD#0:0:0.000000001", LiteralValue::Ltod(1));
         check("DT#1970-01-02-00:00:01.5", LiteralValue::Dt(86_401_500_000_000));
         check("LDT#2024-01-31-12:30:00", LiteralValue::Ldt(1_706_704_200_000_000_000));
-        for text in ["D#2023-02-29", "D#2024-13-01", "D#2024-1", "D#2024-01-01-5", "TOD#24:00", "TOD#12", "TOD#1:2:60", "DT#2024-01-31", "D#0-1-1"] {
+        for text in
+            ["D#2023-02-29", "D#2024-13-01", "D#2024-1", "D#2024-01-01-5", "TOD#24:00", "TOD#12", "TOD#1:2:60", "DT#2024-01-31", "D#0-1-1"]
+        {
             refused(text);
         }
     }

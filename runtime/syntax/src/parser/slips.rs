@@ -6,15 +6,25 @@ use crate::{Code, Diagnostic};
 
 /// Spellings of keywords in other dialects and languages.
 const RESPELLED: &[(&str, Kind)] = &[
-    ("ENDIF", Kind::EndIf), ("ENDFOR", Kind::EndFor), ("ENDWHILE", Kind::EndWhile), ("ENDCASE", Kind::EndCase), ("ENDREPEAT", Kind::EndRepeat),
-    ("ELSEIF", Kind::Elsif), ("ELIF", Kind::Elsif), ("ELSE_IF", Kind::Elsif), ("END_ELSE", Kind::EndIf), ("ENDVAR", Kind::EndVar),
-    ("BREAK", Kind::Exit), ("ENDPROGRAM", Kind::EndProgram), ("ENDFUNCTION", Kind::EndFunction),
+    ("ENDIF", Kind::EndIf),
+    ("ENDFOR", Kind::EndFor),
+    ("ENDWHILE", Kind::EndWhile),
+    ("ENDCASE", Kind::EndCase),
+    ("ENDREPEAT", Kind::EndRepeat),
+    ("ELSEIF", Kind::Elsif),
+    ("ELIF", Kind::Elsif),
+    ("ELSE_IF", Kind::Elsif),
+    ("END_ELSE", Kind::EndIf),
+    ("ENDVAR", Kind::EndVar),
+    ("BREAK", Kind::Exit),
+    ("ENDPROGRAM", Kind::EndProgram),
+    ("ENDFUNCTION", Kind::EndFunction),
 ];
 
 /// Names of types by which a declaration among statements is known.
 const ELEMENTARY: &[&str] = &[
-    "BOOL", "BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "REAL", "LREAL", "TIME", "LTIME",
-    "STRING", "WSTRING", "DATE", "TOD", "DT", "TON", "TOF", "TP", "R_TRIG", "F_TRIG",
+    "BOOL", "BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "REAL", "LREAL", "TIME",
+    "LTIME", "STRING", "WSTRING", "DATE", "TOD", "DT", "TON", "TOF", "TP", "R_TRIG", "F_TRIG",
 ];
 
 /// Whether `name` is that of an integer type, which may be followed by a range.
@@ -29,7 +39,8 @@ impl Parser<'_> {
         let token = self.token();
         let next = self.peek(1);
         let first = self.text.as_bytes()[token.start as usize];
-        let as_name = matches!(next.kind, Kind::Assign | Kind::LParen | Kind::Dot | Kind::LBracket | Kind::Caret | Kind::Colon | Kind::Comma);
+        let as_name =
+            matches!(next.kind, Kind::Assign | Kind::LParen | Kind::Dot | Kind::LBracket | Kind::Caret | Kind::Colon | Kind::Comma);
         if !matches!(first, b'E' | b'e' | b'B' | b'b') || as_name && !self.is_condition_ahead(token.start) {
             return;
         }
@@ -43,7 +54,7 @@ impl Parser<'_> {
 
     /// Whether a misspelled ELSIF is followed by a bracketed condition: `THEN` ends its line.
     fn is_condition_ahead(&self, start: u32) -> bool {
-        let is_elsif = self.text[start as usize..].as_bytes().get(..2).is_some_and(|head| head.eq_ignore_ascii_case(b"el"));
+        let is_elsif = self.text.as_bytes()[start as usize..].get(..2).is_some_and(|head| head.eq_ignore_ascii_case(b"el"));
         is_elsif && (1..64).map(|ahead| self.peek(ahead)).take_while(|token| !token.starts_line).any(|token| token.kind == Kind::Then)
     }
 
@@ -90,6 +101,20 @@ impl Parser<'_> {
         }
     }
 
+    /// Whether the present token touches the string before it, as in `'it's'`.
+    pub(super) fn follows_string(&self) -> bool {
+        let (string, next) = (self.previous(), self.token());
+        string.end == next.start && string.kind == Kind::Literal && self.text_of(string).ends_with(['\'', '"'])
+    }
+
+    /// Takes back the lexer's message about the last quote of such a line: it is the same mistake.
+    pub(super) fn forget_open_string(&mut self) {
+        let start = self.token().start;
+        let length = self.text[start as usize..].find('\n').unwrap_or(self.text.len() - start as usize);
+        let line = start..start + length as u32;
+        self.lexed.diagnostics.retain(|d| d.code != Code::UnterminatedString || !line.contains(&d.span.start));
+    }
+
     /// A statement that begins with something that begins none.
     pub(super) fn misplaced_start(&mut self) {
         let mut diagnostic = self.unexpected("a statement");
@@ -132,13 +157,16 @@ impl Parser<'_> {
         self.recover_head(word, brackets);
     }
 
+    fn ends_head(&self) -> bool {
+        let kind = self.kind();
+        matches!(kind, Kind::Semi | Kind::Eof) || kind.is_reserved() && !is_inside_head(kind)
+    }
+
     /// Skips the rest of a head to its `word`; if a statement ends or begins first, to the next line.
     fn recover_head(&mut self, word: Kind, brackets: i32) {
         let from = self.at;
         loop {
-            let kind = self.kind();
-            let ends = matches!(kind, Kind::Semi | Kind::Eof) || kind.is_reserved() && !is_inside_head(kind);
-            if kind == word || ends {
+            if self.kind() == word || self.ends_head() {
                 break;
             }
             self.bump();
@@ -147,7 +175,7 @@ impl Parser<'_> {
             self.bump();
         } else {
             self.at = from;
-            while !self.token().starts_line && !matches!(self.kind(), Kind::Semi | Kind::Eof) && !(self.kind().is_reserved() && !is_inside_head(self.kind())) {
+            while !self.token().starts_line && !self.ends_head() {
                 self.at += 1;
             }
             self.failed = false;

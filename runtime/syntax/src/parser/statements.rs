@@ -1,8 +1,8 @@
 //! Statements.
 
-use super::{Parser, closes, is_end, is_statement_end, is_unit_end, is_var};
+use super::{Parser, is_end, is_statement_end, is_var};
 use crate::lexer::{Kind, Token};
-use crate::tree::{AssignOp, BinaryOp, CaseLabel, Expr, ExprKind, Stmt, StmtKind};
+use crate::tree::{AssignOp, BinaryOp, CaseLabel, Expr, ExprKind, Stmt, StmtKind, VarBlock, VarKind};
 use crate::{Code, Diagnostic};
 
 impl Parser<'_> {
@@ -13,6 +13,7 @@ impl Parser<'_> {
 
     fn statement_list(&mut self, in_case: bool) -> Vec<Stmt> {
         let mut list = Vec::new();
+        let mut has_statements = false;
         loop {
             let kind = self.kind();
             if kind == Kind::Ident {
@@ -20,15 +21,24 @@ impl Parser<'_> {
             }
             if self.ends_statements() {
                 if !self.skip_stray() {
+                    list.shrink_to_fit();
                     return list;
                 }
             } else if is_var(kind) {
+                if has_statements {
+                    self.late_section();
+                }
                 self.late_declarations();
+            } else if self.is_headless_section() {
+                self.headless_section();
             } else if in_case && self.is_case_label() {
+                list.shrink_to_fit();
                 return list;
             } else {
                 let before = self.at;
-                list.push(self.statement());
+                let statement = self.statement();
+                has_statements |= !matches!(statement.kind, StmtKind::Error);
+                list.push(statement);
                 if self.at == before {
                     self.bump();
                 }
@@ -37,7 +47,7 @@ impl Parser<'_> {
     }
 
     /// Whether the present word cannot belong to a list of statements.
-    fn ends_statements(&self) -> bool {
+    pub(super) fn ends_statements(&self) -> bool {
         use Kind::*;
         let kind = self.kind();
         match kind {
@@ -65,9 +75,9 @@ impl Parser<'_> {
         let token = self.token();
         let kind = token.kind;
         let belongs_here = !matches!(kind, Kind::Else | Kind::Elsif | Kind::Until | Kind::Catch | Kind::Finally | Kind::EndVar)
-            && !matches!(kind, Kind::EndStruct | Kind::EndUnion)
+            && !matches!(kind, Kind::EndStruct | Kind::EndUnion | Kind::EndMethod | Kind::EndAction | Kind::EndProperty)
             && !is_statement_end(kind);
-        if belongs_here || self.open.iter().any(|open| closes(kind, open.end)) {
+        if belongs_here || self.closes_something(kind) {
             return false;
         }
         // A wrong END_ for the innermost block of statements.
@@ -82,20 +92,57 @@ impl Parser<'_> {
         }
         if kind == Kind::Elsif {
             self.condition(Kind::Then);
+        } else if kind == Kind::Until {
+            self.mistaken = Some(Kind::EndRepeat);
+            let brackets = self.brackets;
+            self.until(brackets);
         }
         self.eat(Kind::Semi);
         true
     }
 
     /// VAR among the statements.
-    fn late_declarations(&mut self) {
+    fn late_section(&mut self) {
         let token = self.token();
         let message = format!("`{}` stands behind statements", self.text_of(token));
         let help = "declarations stand before the first statement; a missing `;` or END_VAR may have ended them too early";
         self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(token), message).help(help));
+    }
+
+    fn late_declarations(&mut self) {
         if let Some(block) = self.var_block() {
             self.late_vars.push(block);
         }
+    }
+
+    /// Whether declarations stand here whose VAR is missing: an END_VAR follows.
+    fn is_headless_section(&mut self) -> bool {
+        let declares = self.kind().is_name() && matches!(self.peek(1).kind, Kind::Colon | Kind::Comma | Kind::At);
+        declares && self.is_end_var_ahead()
+    }
+
+    fn headless_section(&mut self) {
+        let token = self.token();
+        let message = format!("expected `VAR`, found {}", self.describe(token));
+        let help = "declarations stand between `VAR` and `END_VAR`";
+        self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(token), message).help(help));
+        self.open_block(token, Kind::EndVar);
+        let vars = self.declarations();
+        self.close_block();
+        let span = self.span_from(token.start);
+        self.late_vars.push(VarBlock { kind: VarKind::Var, constant: false, retain: false, persistent: false, vars, span });
+    }
+
+    /// Whether the next word that begins or ends a block is END_VAR. Remembers the place, so that the way is gone once.
+    fn is_end_var_ahead(&mut self) -> bool {
+        if self.at >= self.end_var_ahead.0 {
+            let rest = &self.lexed.tokens[self.at..];
+            let is_boundary =
+                |kind: Kind| is_var(kind) || is_end(kind) || matches!(kind, Kind::Eof | Kind::If | Kind::For | Kind::Case | Kind::Program);
+            let distance = rest.iter().position(|token| is_boundary(token.kind)).unwrap_or(rest.len() - 1);
+            self.end_var_ahead = (self.at + distance, rest[distance].kind == Kind::EndVar);
+        }
+        self.end_var_ahead.1
     }
 
     fn statement(&mut self) -> Stmt {
@@ -115,6 +162,9 @@ impl Parser<'_> {
         }
         let failed = self.failed;
         if !matches!(kind, StmtKind::Label(_)) || failed {
+            if let Some(kind) = self.headless_block(start, brackets) {
+                return Stmt { kind, span: self.span_from(start.start) };
+            }
             self.end_statement(brackets);
         }
         Stmt { kind: if failed { StmtKind::Error } else { kind }, span }
@@ -130,7 +180,9 @@ impl Parser<'_> {
             Kind::Repeat => self.repeat_statement(),
             Kind::Try => self.try_statement(),
             Kind::Exit => self.word(StmtKind::Exit),
-            Kind::Continue if matches!(self.peek(1).kind, Kind::Semi | Kind::Eof) || self.peek(1).kind.is_reserved() => self.word(StmtKind::Continue),
+            Kind::Continue if matches!(self.peek(1).kind, Kind::Semi | Kind::Eof) || self.peek(1).kind.is_reserved() => {
+                self.word(StmtKind::Continue)
+            }
             Kind::Return => self.return_statement(),
             Kind::Jmp => {
                 self.bump();
@@ -153,7 +205,9 @@ impl Parser<'_> {
     fn return_statement(&mut self) -> StmtKind {
         self.bump();
         let next = self.token();
-        if next.kind == Kind::LParen || (next.kind.is_name() || matches!(next.kind, Kind::Int | Kind::Literal | Kind::True | Kind::False)) && !next.starts_line {
+        if next.kind == Kind::LParen
+            || (next.kind.is_name() || matches!(next.kind, Kind::Int | Kind::Literal | Kind::True | Kind::False)) && !next.starts_line
+        {
             let message = format!("expected `;` behind `RETURN`, found {}", self.describe(next));
             let help = "a result is assigned to the name of its function or method: `f := 1; RETURN;`";
             self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(next), message).help(help));
@@ -255,10 +309,53 @@ impl Parser<'_> {
         expr
     }
 
+    /// A block whose first word is missing or misspelled: the line has its THEN, DO or OF.
+    fn headless_block(&mut self, start: Token, brackets: i32) -> Option<StmtKind> {
+        if self.kind() == Kind::Semi || self.token().starts_line {
+            return None;
+        }
+        let line = self.lexed.tokens[self.at..].iter().take_while(|token| !token.starts_line && token.kind != Kind::Semi);
+        let distance = line.clone().position(|token| matches!(token.kind, Kind::Then | Kind::Do | Kind::Of))?;
+        let counts = line.clone().take(distance).any(|token| token.kind == Kind::To);
+        let word = self.peek(distance).kind;
+        let (first, end) = match word {
+            Kind::Then => ("IF", Kind::EndIf),
+            Kind::Of => ("CASE", Kind::EndCase),
+            _ if counts => ("FOR", Kind::EndFor),
+            _ => ("WHILE", Kind::EndWhile),
+        };
+        let message = format!("expected `{first}` before {}, as `{}` follows", self.describe(start), word.text());
+        self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(start), message));
+        while self.kind() != word {
+            self.bump();
+        }
+        self.bump();
+        self.brackets = brackets;
+        self.failed = false;
+        self.open_block(start, end);
+        self.assumed = Some(end);
+        let cond = Expr { kind: ExprKind::Error, span: self.span_of(start) };
+        let kind = match word {
+            Kind::Then => self.if_rest(cond),
+            Kind::Of => self.case_rest(cond),
+            _ => {
+                let body = self.statements();
+                self.close_block();
+                StmtKind::While { cond, body }
+            }
+        };
+        self.eat(Kind::Semi);
+        Some(kind)
+    }
+
     fn if_statement(&mut self) -> StmtKind {
         let start = self.bump();
         self.open_block(start, Kind::EndIf);
         let cond = self.condition(Kind::Then);
+        self.if_rest(cond)
+    }
+
+    fn if_rest(&mut self, cond: Expr) -> StmtKind {
         let mut arms = vec![(cond, self.statements())];
         let mut otherwise: Option<Vec<Stmt>> = None;
         loop {
@@ -285,6 +382,10 @@ impl Parser<'_> {
         let start = self.bump();
         self.open_block(start, Kind::EndCase);
         let value = self.condition(Kind::Of);
+        self.case_rest(value)
+    }
+
+    fn case_rest(&mut self, value: Expr) -> StmtKind {
         let (mut arms, mut otherwise) = (Vec::new(), None::<Vec<Stmt>>);
         loop {
             if self.is_case_label() {
@@ -300,7 +401,10 @@ impl Parser<'_> {
             } else if self.ends_statements() {
                 break;
             } else {
-                self.tell(self.unexpected("a label such as `1:` or `END_CASE`"));
+                if !self.is_known_trouble() {
+                    self.tell(self.unexpected("a label such as `1:` or `END_CASE`"));
+                }
+                self.skip_to_colon();
                 let before = self.at;
                 self.statement_list(true);
                 if self.at == before {
@@ -333,7 +437,8 @@ impl Parser<'_> {
     /// Whether a label of CASE stands here: a literal, or a name that is followed by `:`, `,` or `..`.
     fn is_case_label(&self) -> bool {
         match self.kind() {
-            Kind::Int | Kind::Literal | Kind::True | Kind::False | Kind::Minus | Kind::Plus | Kind::LParen | Kind::Not => return true,
+            Kind::Int | Kind::Literal | Kind::True | Kind::False | Kind::Minus | Kind::Plus | Kind::Not => return true,
+            Kind::LParen => return self.has_colon_ahead(),
             kind if kind.is_name() => {}
             _ => return false,
         }
@@ -352,6 +457,11 @@ impl Parser<'_> {
             Kind::Comma | Kind::DotDot => true,
             _ => false,
         }
+    }
+
+    fn has_colon_ahead(&self) -> bool {
+        let line = (1..32).map(|ahead| self.peek(ahead)).take_while(|token| !token.starts_line && token.kind != Kind::Semi);
+        line.map(|token| token.kind).any(|kind| kind == Kind::Colon)
     }
 
     fn for_statement(&mut self) -> StmtKind {
@@ -392,21 +502,31 @@ impl Parser<'_> {
         if self.kind() == Kind::Until {
             let brackets = self.brackets;
             self.bump();
-            until = self.expression();
-            if self.kind() == Kind::Assign && !self.failed {
-                self.slip_assign();
-                self.expression();
-            }
-            if self.failed {
-                self.recover_statement(brackets);
-            }
-            self.eat(Kind::Semi);
+            until = self.until(brackets);
         } else if self.kind() == Kind::EndRepeat {
             let help = "write `UNTIL condition` before `END_REPEAT`";
             self.expect_or_assume(Kind::Until, help);
         }
         self.close_block();
         StmtKind::Repeat { body, until }
+    }
+
+    /// The condition behind UNTIL, with or without `;`.
+    fn until(&mut self, brackets: i32) -> Expr {
+        let cond = self.expression();
+        if self.kind() == Kind::Assign && !self.failed {
+            self.slip_assign();
+            self.expression();
+        }
+        let next = self.token();
+        if !self.failed && next.kind != Kind::Semi && !next.starts_line && !next.kind.is_reserved() {
+            self.unexpected_here("an operator or `END_REPEAT`");
+        }
+        if self.failed {
+            self.recover_statement(brackets);
+        }
+        self.eat(Kind::Semi);
+        cond
     }
 
     fn try_statement(&mut self) -> StmtKind {
@@ -430,128 +550,4 @@ impl Parser<'_> {
         self.close_block();
         StmtKind::Try { body, catch, finally }
     }
-
-    // Ends and recovery.
-
-    /// Takes the `;`. Where it is merely missing, says so behind the last word and takes it as read; otherwise looks for the next statement.
-    fn end_statement(&mut self, brackets: i32) {
-        if !self.failed && !self.eat(Kind::Semi) && !self.is_known_trouble() {
-            let next = self.token();
-            let begins = next.starts_line || next.kind == Kind::Eof || next.kind.is_reserved() || self.starts_statement();
-            if begins && self.can_start_statement() {
-                let message = format!("expected `;`, found {}", self.describe(next));
-                self.tell(Diagnostic::new(Code::UnexpectedToken, self.gap(), message));
-                return;
-            }
-            self.junk_behind_statement();
-        } else if self.previous().kind == Kind::Semi && !self.failed {
-            return;
-        }
-        self.recover_statement(brackets);
-    }
-
-    fn junk_behind_statement(&mut self) {
-        let next = self.token();
-        let mut diagnostic = self.unexpected(if next.kind.is_name() { "an operator or `;`" } else { "`;`" });
-        if matches!(next.kind, Kind::RParen | Kind::RBracket) {
-            diagnostic.help = Some("no bracket is open here".to_owned());
-        }
-        self.tell(diagnostic);
-        self.failed = true;
-    }
-
-    /// Whether the present token can be the first of a statement or of what follows the statements.
-    fn can_start_statement(&self) -> bool {
-        let kind = self.kind();
-        kind.is_name() || matches!(kind, Kind::Eof | Kind::Direct) || kind.is_reserved() && !is_inner_word(kind)
-    }
-
-    /// Whether a statement certainly starts here: a keyword of one, or a place in front of `:=`. Looks a few tokens ahead.
-    pub(super) fn starts_statement(&self) -> bool {
-        let kind = self.kind();
-        if !kind.is_name() {
-            return kind.is_reserved() && !is_inner_word(kind);
-        }
-        let mut depth = 0;
-        for ahead in 1..24 {
-            let token = self.peek(ahead);
-            match token.kind {
-                Kind::Assign | Kind::TryAssign if depth == 0 => return true,
-                Kind::LBracket => depth += 1,
-                Kind::RBracket => depth -= 1,
-                Kind::Dot | Kind::Caret | Kind::Int => {}
-                kind if kind.is_name() && (depth > 0 || self.peek(ahead - 1).kind == Kind::Dot) => {}
-                _ if depth > 0 => {}
-                _ => return false,
-            }
-        }
-        false
-    }
-
-    /// Skips to the next statement: behind a `;`, to a keyword, or to a name that begins a line outside of brackets.
-    pub(super) fn recover_statement(&mut self, brackets: i32) {
-        loop {
-            let token = self.token();
-            match token.kind {
-                Kind::Eof => break,
-                Kind::Semi => {
-                    self.bump();
-                    break;
-                }
-                kind if kind.is_reserved() && !is_inner_word(kind) => break,
-                kind if token.starts_line && kind.is_name() && self.brackets <= brackets => break,
-                _ => {
-                    self.bump();
-                }
-            }
-        }
-        self.brackets = brackets;
-        self.failed = false;
-    }
-
-    fn recover_to_colon(&mut self, brackets: i32) {
-        while !matches!(self.kind(), Kind::Colon | Kind::Semi | Kind::Eof) && !self.token().starts_line && !self.ends_statements() {
-            self.bump();
-        }
-        self.failed = false;
-        self.brackets = brackets;
-        self.eat(Kind::Colon);
-    }
-
-    /// Skips a statement that is nested too deeply, with all that is in it.
-    fn skip_nested(&mut self) {
-        let brackets = self.brackets;
-        let mut depth = 0_usize;
-        loop {
-            let kind = self.kind();
-            match kind {
-                Kind::If | Kind::Case | Kind::For | Kind::While | Kind::Repeat | Kind::Try => depth += 1,
-                Kind::Eof | Kind::Function | Kind::FunctionBlock | Kind::Program | Kind::Type | Kind::Configuration => break,
-                _ if is_unit_end(kind) => break,
-                _ if depth == 0 => {
-                    self.recover_statement(brackets);
-                    break;
-                }
-                _ if is_statement_end(kind) => depth -= 1,
-                _ => {}
-            }
-            self.bump();
-            if depth == 0 {
-                self.failed = false;
-                self.eat(Kind::Semi);
-                break;
-            }
-        }
-        self.brackets = brackets;
-        self.failed = false;
-    }
-}
-
-/// Whether a reserved word stands inside statements and expressions only.
-fn is_inner_word(kind: Kind) -> bool {
-    use Kind::*;
-    matches!(
-        kind,
-        Then | Of | To | By | Do | And | Or | Xor | Not | Mod | AndThen | OrElse | True | False | Array | At | Struct
-    )
 }

@@ -116,7 +116,9 @@ impl Parser<'_> {
                 break;
             }
         }
-        self.close(Kind::RBracket, open);
+        if !self.close(Kind::RBracket, open) {
+            self.failed |= self.kind() != Kind::Of;
+        }
         self.expect_or_assume(Kind::Of, "an array is written `ARRAY [0..9] OF INT`");
         TypeExprKind::Array { dims, elem: Box::new(self.type_expr()) }
     }
@@ -202,27 +204,53 @@ impl Parser<'_> {
         let block_pragmas = self.pragmas(index);
         let mut block_doc = self.doc_before(index);
         let mut list = Vec::new();
-        while self.kind().is_name() && !self.starts_soft_unit() {
+        loop {
             let brackets = self.brackets;
-            let first = self.at;
-            let mut pragmas = block_pragmas.clone();
-            pragmas.extend(self.pragmas(first));
-            let doc = self.doc_before(first);
-            let mut decl = self.type_decl();
-            decl.doc = doc.or(block_doc.take());
-            decl.pragmas = pragmas;
-            list.push(decl);
-            if self.failed {
-                self.recover_declaration(brackets);
+            if self.is_block_boundary() {
+                break;
             }
-        }
-        if !self.is_block_boundary() {
-            let brackets = self.brackets;
-            self.unexpected_here("the name of a type");
-            self.recover_declaration(brackets);
+            if self.kind().is_name() {
+                let first = self.at;
+                let mut pragmas = block_pragmas.clone();
+                pragmas.extend(self.pragmas(first));
+                let doc = self.doc_before(first);
+                let mut decl = self.type_decl();
+                decl.doc = doc.or(block_doc.take());
+                decl.pragmas = pragmas;
+                list.push(decl);
+            } else {
+                self.unexpected_here("the name of a type");
+            }
+            if self.failed {
+                self.recover_type(brackets);
+            }
         }
         self.close_block();
         list
+    }
+
+    /// Skips to the next type, behind the fields of one whose head could not be read.
+    fn recover_type(&mut self, brackets: i32) {
+        let rest = &self.lexed.tokens[self.at..];
+        let boundary =
+            |kind: Kind| matches!(kind, Kind::Semi | Kind::EndType | Kind::EndStruct | Kind::EndUnion | Kind::Struct | Kind::Eof);
+        let mut ends = rest.iter().map(|token| token.kind).filter(|&kind| boundary(kind) && kind != Kind::Semi);
+        let opens_first = rest.iter().find(|token| boundary(token.kind)).is_some_and(|token| token.kind == Kind::Struct);
+        let has_fields = match ends.next() {
+            Some(Kind::EndStruct | Kind::EndUnion) => true,
+            Some(Kind::Struct) if opens_first => matches!(ends.next(), Some(Kind::EndStruct)),
+            _ => false,
+        };
+        if !has_fields {
+            return self.recover_declaration(brackets);
+        }
+        while !matches!(self.kind(), Kind::EndStruct | Kind::EndUnion) {
+            self.bump();
+        }
+        self.bump();
+        self.brackets = brackets;
+        self.failed = false;
+        self.eat(Kind::Semi);
     }
 
     fn type_decl(&mut self) -> TypeDecl {

@@ -100,7 +100,9 @@ impl Parser<'_> {
             let help = "statements stand in a unit: `PROGRAM main … END_PROGRAM`";
             (format!("expected a program unit such as PROGRAM or TYPE, found {found}"), Some(help))
         };
-        if !self.is_known_trouble() {
+        let is_forgiven = self.is_homeless && is_end(token.kind);
+        self.is_homeless = !is_end(token.kind);
+        if !self.is_known_trouble() && !is_forgiven {
             self.tell(Diagnostic { message, help: help.map(str::to_owned), ..diagnostic });
         }
         self.bump();
@@ -113,7 +115,9 @@ impl Parser<'_> {
     fn starts_unit(&self) -> bool {
         use Kind::*;
         match self.kind() {
-            Eof | Function | FunctionBlock | Program | Type | VarGlobal | VarConfig | Configuration => true,
+            // `PROGRAM p WITH task : Main` and `PROGRAM p : Main` belong to a configuration.
+            Program => !matches!(self.peek(2).kind, With | Colon),
+            Eof | Function | FunctionBlock | Type | VarGlobal | VarConfig | Configuration => true,
             _ => self.starts_soft_unit() || self.starts_member(),
         }
     }
@@ -122,12 +126,18 @@ impl Parser<'_> {
     fn pou(&mut self, kind: PouKind, end: Kind) -> Pou {
         let index = self.at;
         let start = self.bump();
+        self.is_homeless = false;
         self.open_block(start, end);
         let mut pou = self.empty_pou(kind, start);
         pou.pragmas = self.pragmas(index);
         pou.doc = self.doc_before(index);
         pou.modifiers = self.modifiers();
-        pou.name = self.name("the name of the unit");
+        if matches!(self.kind(), Kind::Extends | Kind::Implements) && self.peek(1).kind.is_name() {
+            let diagnostic = self.unexpected("the name of the unit");
+            self.tell(diagnostic);
+        } else {
+            pou.name = self.name("the name of the unit");
+        }
         if self.kind() == Kind::Extends && !self.failed {
             self.bump();
             pou.extends = Some(self.qualified_name("the name of a block"));
@@ -166,12 +176,20 @@ impl Parser<'_> {
         if self.at > taken { self.span_of(token) } else { self.gap() }
     }
 
-    /// Ends the first line of a unit or member; nothing but a `;` may follow on it.
+    /// Ends the first line of a unit or member, behind which a `;`, a section or a statement may stand.
     pub(super) fn end_header(&mut self) {
         self.eat(Kind::Semi);
         let next = self.token();
-        if !self.failed && !next.starts_line && !next.kind.is_reserved() && next.kind != Kind::Eof && !self.starts_statement() && !self.is_call_ahead() {
-            self.unexpected_here("a new line behind the head of the unit");
+        let behind = self.peek(1);
+        let is_statement = matches!(
+            behind.kind,
+            Kind::Assign | Kind::TryAssign | Kind::Eq | Kind::LParen | Kind::LBracket | Kind::Dot | Kind::Caret | Kind::Colon
+        );
+        let is_lone_name = next.kind == Kind::Ident && (!is_statement || behind.starts_line) && !self.is_letter_sign(1, "S");
+        let is_sign =
+            !next.kind.is_name() && !next.kind.is_reserved() && !matches!(next.kind, Kind::Eof | Kind::Dot | Kind::Direct | Kind::Bad);
+        if !self.failed && !next.starts_line && (is_lone_name || is_sign) {
+            self.unexpected_here("the end of the line or `:` and a type");
         }
         if self.failed {
             while !self.token().starts_line && !self.starts_unit() && !is_var(self.kind()) && !is_end(self.kind()) {
@@ -180,10 +198,6 @@ impl Parser<'_> {
             self.failed = false;
             self.brackets = 0;
         }
-    }
-
-    fn is_call_ahead(&self) -> bool {
-        self.kind().is_name() && matches!(self.peek(1).kind, Kind::LParen | Kind::Dot)
     }
 
     pub(super) fn name_list(&mut self) -> Vec<Name> {
@@ -240,4 +254,3 @@ impl Parser<'_> {
         Interface { name, extends, methods: holder.methods, properties: holder.properties, span }
     }
 }
-
