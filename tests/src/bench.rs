@@ -56,7 +56,9 @@ fn check(case: &Case) -> Result<(), String> {
     if expected.len() == found.len() && expected.iter().zip(&found).all(fits) {
         return Ok(());
     }
-    let list = |all: &[Expected]| all.iter().map(|e| format!("\n    {}:{} {} {}", e.line + case.line - 1, e.column, e.code, e.text)).collect::<String>();
+    let list = |all: &[Expected]| {
+        all.iter().map(|e| format!("\n    {}:{} {} {}", e.line + case.line - 1, e.column, e.code, e.text)).collect::<String>()
+    };
     Err(format!("expected:{}\n  found:{}", list(&expected), list(&found)))
 }
 
@@ -144,7 +146,12 @@ pub fn compare(a: &Engine, b: &Engine) -> Result<(), String> {
     }
     match a.image().iter().zip(b.image()).position(|(x, y)| x != y) {
         None => Ok(()),
-        Some(at) => Err(format!("the executors differ at byte {at} ({}): interpreter {}, machine code {}", name_of(a.program(), at), a.image()[at], b.image()[at])),
+        Some(at) => Err(format!(
+            "the executors differ at byte {at} ({}): interpreter {}, machine code {}",
+            name_of(a.program(), at),
+            a.image()[at],
+            b.image()[at]
+        )),
     }
 }
 

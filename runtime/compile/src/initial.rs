@@ -178,6 +178,11 @@ impl<'a> Compiler<'a> {
         late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
         span: Span,
     ) -> bool {
+        if let InitItem::One(Init::Expr(expr)) = item
+            && let Some((count, value)) = self.named_repeat(expr, pou)
+        {
+            return self.overlay_named_repeat(count, value, elem, pou, bytes, (next, end, size), late, span);
+        }
         let (count, values) = match item {
             InitItem::One(init) => (1, std::slice::from_ref(init)),
             InitItem::Repeat(count, values) => match self.constant_int(count, pou) {
@@ -213,6 +218,48 @@ impl<'a> Compiler<'a> {
             let from = start as usize;
             bytes.copy_within(from..from + stride, from + i * stride);
             *next += stride as u32;
+        }
+        true
+    }
+
+    /// `N(x)` with a constant N: a repetition that reads like a call.
+    fn named_repeat(&mut self, expr: &'a tree::Expr, pou: Option<usize>) -> Option<(i128, Option<&'a tree::Expr>)> {
+        let tree::ExprKind::Call(callee, args) = &expr.kind else { return None };
+        let tree::ExprKind::Name(name) = &callee.kind else { return None };
+        let local = pou.is_some_and(|p| self.pous[p].index.contains_key(&key(name)));
+        if !local && !matches!(self.global_name(name), Some(crate::scope::Item::Global(_))) {
+            return None;
+        }
+        let count = self.constant_int(callee, pou)?;
+        Some((count, args.first().and_then(|a| a.value.as_ref())))
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "the walk over an initialiser carries its place")]
+    fn overlay_named_repeat(
+        &mut self,
+        count: i128,
+        value: Option<&'a tree::Expr>,
+        elem: TypeId,
+        pou: Option<usize>,
+        bytes: &mut [u8],
+        (next, end, size): (&mut u32, u32, u32),
+        late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
+        span: Span,
+    ) -> bool {
+        if count < 0 || count * i128::from(size) > i128::from(end - *next) {
+            let most = (end - *next) / size;
+            self.report(Code::BadInitializer, span, format!("there is room for {most} more elements, found {count}"));
+            return false;
+        }
+        for _ in 0..count {
+            if let Some(expr) = value {
+                match self.known(expr, pou, Some(elem)).0 {
+                    Known::Value(value) => self.store_value(&value, elem, &mut bytes[*next as usize..]),
+                    Known::Dynamic => late.push((*next, elem, expr)),
+                    Known::Error => return false,
+                }
+            }
+            *next += size;
         }
         true
     }
