@@ -31,3 +31,6 @@ pub use fault::{FaultRecord, Frame};
 pub use load::{LoadError, WireProblem, load};
 pub use options::{Clock, ExecutorKind, Options, Preemption};
 pub use statistics::{Histogram, TaskStatistics};
+
+#[cfg(test)]
+mod tests;

@@ -319,24 +319,18 @@ impl Axis {
             return; // `show` knows the error code.
         }
         let commanded = r.bRegulatorOn.get() && r.bDriveStart.get();
+        let enabled = self.drive == DriveState::OperationEnabled;
         match state {
-            AxisState::power_off => {
-                if self.drive == DriveState::OperationEnabled && commanded {
-                    r.nAxisState = AxisState::standstill;
-                    r.nCommandedBy = 0;
-                }
+            AxisState::power_off if enabled && commanded => (r.nAxisState, r.nCommandedBy) = (AxisState::standstill, 0),
+            AxisState::power_off => {}
+            AxisState::stopping if self.quick_stop && !enabled && !self.moves() => {
+                self.quick_stop = false;
+                r.nAxisState = AxisState::power_off;
             }
-            AxisState::stopping if self.quick_stop => {
-                if !self.moves() && self.drive != DriveState::OperationEnabled {
-                    self.quick_stop = false;
-                    r.nAxisState = AxisState::power_off;
-                }
-            }
-            _ if self.drive != DriveState::OperationEnabled && commanded && self.was_enabled => {
-                self.fail(r, SmcError::SMC_DI_VOLTAGE_DISABLED)
-            }
-            _ if self.drive != DriveState::OperationEnabled && commanded => self.fail(r, SmcError::SMC_AXIS_IS_NOT_OPERATIONAL),
-            _ => {}
+            AxisState::stopping if self.quick_stop => {}
+            _ if enabled || !commanded => {}
+            _ if self.was_enabled => self.fail(r, SmcError::SMC_DI_VOLTAGE_DISABLED),
+            _ => self.fail(r, SmcError::SMC_AXIS_IS_NOT_OPERATIONAL),
         }
     }
 
