@@ -17,7 +17,7 @@ use cranelift_codegen::ir::{
 };
 use cranelift_codegen::isa::{CallConv, TargetIsa};
 use cranelift_frontend::{FunctionBuilder, Variable};
-use takt_ir::{Body, BodyId, Const, Inst, Local, Program, SiteId, Ty};
+use takt_ir::{Body, Const, Inst, Local, Program, SiteId, Ty};
 
 /// The signature of a body with parameters and result of these types.
 pub(crate) fn signature(params: &[Ty], result: Option<Ty>) -> Signature {
@@ -111,7 +111,7 @@ struct Lowering<'a, 'f> {
     cold: [Option<ir::Block>; 6],
     /// Words of native calls.
     words: Option<StackSlot>,
-    callees: Vec<(BodyId, FuncRef)>,
+    callees: Vec<(u32, FuncRef)>,
     signatures: Vec<(Signature, SigRef)>,
     image_flags: MemFlagsData,
     ctx_flags: MemFlagsData,

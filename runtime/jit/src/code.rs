@@ -53,15 +53,17 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
     let pool: Box<[u8]> = program.data.clone().into_boxed_slice();
     let mut functions = machine::bodies(program, &*isa, pool.as_ptr() as usize, defect)?;
     let frames: Vec<usize> = functions.iter().map(|f| f.frame).collect();
-    for (k, result) in ENTRIES.into_iter().enumerate() {
-        functions.push(machine::entry(&*isa, result, FuncId::from_u32((frames.len() + k) as u32))?);
+    // The bodies keep their numbers; behind them stand the slow path of polls and the ways in.
+    functions.push(machine::slow_poll(&*isa, FuncId::from_u32(functions.len() as u32))?);
+    for result in ENTRIES {
+        functions.push(machine::entry(&*isa, result, FuncId::from_u32(functions.len() as u32))?);
     }
     let size = functions.iter().map(|f| f.bytes.len()).sum();
     let (module, addresses) = link(isa, &functions)?;
-    let (bodies, entries) = addresses.split_at(frames.len());
+    let (bodies, others) = addresses.split_at(frames.len());
     let bodies = program.bodies.iter().zip(bodies).map(|(body, &address)| Entry {
         address,
-        by: entry_of(body.result).filter(|_| body.params == 0).map(|k| entries[k]),
+        by: entry_of(body.result).filter(|_| body.params == 0).map(|k| others[1 + k]),
         site: body.entry_site.0,
     });
     let image_size = program.image_size.into();
@@ -155,7 +157,8 @@ impl Code {
         self.call(body, frame, ctx).map_or_else(|code| code, |_| 0)
     }
 
-    /// As [`Code::run`], with what the body returns as a word (0 if nothing).
+    /// As [`Code::run`], with what the body returns as a word (0 if nothing; which NaN a float is may differ from
+    /// the interpreter's).
     ///
     /// # Errors
     /// The code of the fault.

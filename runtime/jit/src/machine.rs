@@ -10,6 +10,7 @@ use cranelift_codegen::isa::{CallConv, OwnedTargetIsa, TargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_module::{FuncId, ModuleReloc};
+use std::mem::offset_of;
 use takt_ir::{Program, Ty};
 
 /// Instructions of the IR from which a second thread is worth its start.
@@ -92,6 +93,39 @@ pub(crate) fn entry(isa: &dyn TargetIsa, result: Option<Ty>, id: FuncId) -> Resu
     b.ins().return_(&results[..1]);
     b.finalize(isa.frontend_config());
     maker.emit("entry", id)
+}
+
+/// The slow path of a poll, for bodies to call: `fn(ctx, site)` that leaves every register as it was and the status of [`Context::poll`] in
+/// `ctx.fault_code`. So a poll in a loop costs no register.
+///
+/// [`Context::poll`]: takt_abi::Context
+pub(crate) fn slow_poll(isa: &dyn TargetIsa, id: FuncId) -> Result<Compiled, JitError> {
+    let mut maker = Maker::new(isa);
+    maker.context.func = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), slow_poll_signature());
+    let mut b = FunctionBuilder::new(&mut maker.context.func, &mut maker.builder);
+    let block = b.create_block();
+    b.append_block_params_for_function_params(block);
+    b.switch_to_block(block);
+    b.seal_all_blocks();
+    let params = b.block_params(block).to_vec();
+    let mut signature = Signature::new(isa.default_call_conv());
+    signature.params.extend([AbiParam::new(types::I64), AbiParam::new(types::I32)]);
+    signature.returns.push(AbiParam::new(types::I32));
+    let callee = b.import_signature(signature);
+    let target = b.ins().load(types::I64, MemFlagsData::trusted(), params[0], offset_of!(takt_abi::Context, poll) as i32);
+    let call = b.ins().call_indirect(callee, target, &params);
+    let code = b.inst_results(call)[0];
+    b.ins().store(MemFlagsData::trusted(), code, params[0], offset_of!(takt_abi::Context, fault_code) as i32);
+    b.ins().return_(&[]);
+    b.finalize(isa.frontend_config());
+    maker.emit("poll", id)
+}
+
+/// The signature of [`slow_poll`].
+pub(crate) fn slow_poll_signature() -> Signature {
+    let mut signature = Signature::new(CallConv::PreserveAll);
+    signature.params.extend([AbiParam::new(types::I64), AbiParam::new(types::I32)]);
+    signature
 }
 
 /// Memory of the code generator, used again for each function.

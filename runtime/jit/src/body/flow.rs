@@ -2,10 +2,11 @@
 
 use super::{Cold, Lowering, register, signature};
 use crate::defect::Defect;
+use crate::machine;
 use crate::runtime;
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{
-    self, ExtFuncData, ExternalName, FuncRef, InstBuilder, StackSlotData, StackSlotKind, UserExternalName, Value, types,
+    self, ExtFuncData, ExternalName, FuncRef, InstBuilder, Signature, StackSlotData, StackSlotKind, UserExternalName, Value, types,
 };
 use cranelift_frontend::Switch;
 use std::mem::offset_of;
@@ -19,7 +20,7 @@ const FUEL: i32 = offset_of!(Context, fuel) as i32;
 const DEPTH: i32 = offset_of!(Context, depth) as i32;
 const DEPTH_LIMIT: i32 = offset_of!(Context, depth_limit) as i32;
 const STACK_END: i32 = offset_of!(Context, stack_end) as i32;
-const POLL: i32 = offset_of!(Context, poll) as i32;
+const FAULT_CODE: i32 = offset_of!(Context, fault_code) as i32;
 // The atomic load of the flag takes no offset.
 const _: () = assert!(offset_of!(Context, flag) == 0);
 
@@ -180,9 +181,10 @@ impl Lowering<'_, '_> {
         self.b.ins().brif(asks, slow, &[], next, &[]);
         self.b.switch_to_block(slow);
         self.b.seal_block(slow);
-        let target = self.b.ins().load(types::I64, self.ctx_flags, self.ctx, POLL);
+        let callee = self.slow_poll();
         let place = self.b.ins().iconst(types::I32, i64::from(site.0));
-        let code = self.call_indirect(target, &[self.ctx, place], Some(types::I32));
+        self.b.ins().call(callee, &[self.ctx, place]);
+        let code = self.b.ins().load(types::I32, self.ctx_flags, self.ctx, FAULT_CODE);
         let (cold, args) = self.cold_target(Cold::Stopped, site, &[code]);
         self.b.ins().brif(code, cold, &args, next, &[]);
         self.b.switch_to_block(next);
@@ -210,15 +212,23 @@ impl Lowering<'_, '_> {
         }
     }
     fn callee(&mut self, body: BodyId) -> FuncRef {
-        if let Some((_, reference)) = self.callees.iter().find(|(known, _)| *known == body) {
+        let ours = &self.program.bodies[body.0 as usize];
+        self.function(body.0, || signature(&ours.locals[..ours.params as usize], ours.result))
+    }
+    /// The function behind the bodies.
+    fn slow_poll(&mut self) -> FuncRef {
+        self.function(self.program.bodies.len() as u32, machine::slow_poll_signature)
+    }
+    /// A function of this program by its number.
+    fn function(&mut self, id: u32, signature: impl FnOnce() -> Signature) -> FuncRef {
+        if let Some((_, reference)) = self.callees.iter().find(|(known, _)| *known == id) {
             return *reference;
         }
-        let ours = &self.program.bodies[body.0 as usize];
-        let signature = self.b.import_signature(signature(&ours.locals[..ours.params as usize], ours.result));
-        let name = self.b.func.declare_imported_user_function(UserExternalName::new(0, body.0));
+        let signature = self.b.import_signature(signature());
+        let name = self.b.func.declare_imported_user_function(UserExternalName::new(0, id));
         let data = ExtFuncData { name: ExternalName::user(name), signature, colocated: true, patchable: false };
         let reference = self.b.import_function(data);
-        self.callees.push((body, reference));
+        self.callees.push((id, reference));
         reference
     }
 

@@ -81,12 +81,22 @@ impl Lowering<'_, '_> {
         if matches!(opcode, Some(Opcode::FcvtFromSint | Opcode::FcvtFromUint)) {
             return value;
         }
-        let nan = match self.b.func.dfg.value_type(value) {
+        let ty = self.b.func.dfg.value_type(value);
+        let unordered = self.b.ins().fcmp(FloatCC::Unordered, value, value);
+        let (cold, next) = (self.b.create_block(), self.b.create_block());
+        self.b.set_cold_block(cold);
+        let result = self.b.append_block_param(next, ty);
+        self.b.ins().brif(unordered, cold, &[], next, &[value.into()]);
+        self.b.switch_to_block(cold);
+        self.b.seal_block(cold);
+        let nan = match ty {
             types::F32 => self.b.ins().f32const(Ieee32::with_bits(0x7FC0_0000)),
             _ => self.b.ins().f64const(Ieee64::with_bits(0x7FF8_0000_0000_0000)),
         };
-        let unordered = self.b.ins().fcmp(FloatCC::Unordered, value, value);
-        self.b.ins().select(unordered, nan, value)
+        self.b.ins().jump(next, &[nan.into()]);
+        self.b.switch_to_block(next);
+        self.b.seal_block(next);
+        result
     }
 
     /// The index, if it lies between constant bounds; otherwise a fault.

@@ -93,6 +93,12 @@ fn run(program: &Program, start: Start, executor: impl FnOnce(&mut Context) -> (
         env: &mut env,
     };
     let (code, result) = executor(&mut ctx);
+    // A result is a word in a register: which NaN it is says nothing.
+    let result = match program.bodies[program.tasks[0].entry.0 as usize].result {
+        Some(Ty::F32) if f32::from_bits(result as u32).is_nan() => 0x7FC0_0000,
+        Some(Ty::F64) if f64::from_bits(result).is_nan() => 0x7FF8_0000_0000_0000,
+        _ => result,
+    };
     let (fault, site, trace) = (ctx.fault(), ctx.fault_site, ctx.trace[..ctx.trace_len as usize].to_vec());
     Outcome { code, result, fault, site, trace, fuel: ctx.fuel, depth: ctx.depth, image }
 }
