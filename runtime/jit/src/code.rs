@@ -8,7 +8,7 @@ use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 use std::sync::Mutex;
 use takt_abi::{Context, Fault};
-use takt_ir::{BodyId, Op, Program, Ty, VerifyError};
+use takt_ir::{Body, BodyId, Op, Program, Ty, VerifyError};
 
 /// Why a program could not be compiled. Only [`JitError::Verify`] can be the program's fault.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,16 +55,18 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
     let frames: Vec<usize> = functions.iter().map(|f| f.frame).collect();
     // The bodies keep their numbers; behind them stand the slow path of polls and the ways in.
     functions.push(machine::slow_poll(&*isa, FuncId::from_u32(functions.len() as u32))?);
-    for result in ENTRIES {
-        functions.push(machine::entry(&*isa, result, FuncId::from_u32(functions.len() as u32))?);
+    let mut ways: Vec<(Option<Ty>, usize)> = Vec::new();
+    for body in program.bodies.iter().filter(|body| enterable(body)) {
+        if ways.iter().all(|(result, _)| *result != body.result) {
+            ways.push((body.result, functions.len()));
+            functions.push(machine::entry(&*isa, body.result, FuncId::from_u32(functions.len() as u32))?);
+        }
     }
     let size = functions.iter().map(|f| f.bytes.len()).sum();
     let (module, addresses) = link(isa, &functions)?;
-    let (bodies, others) = addresses.split_at(frames.len());
-    let bodies = program.bodies.iter().zip(bodies).map(|(body, &address)| Entry {
-        address,
-        by: entry_of(body.result).filter(|_| body.params == 0).map(|k| others[1 + k]),
-        site: body.entry_site.0,
+    let bodies = program.bodies.iter().zip(&addresses).map(|(body, &address)| {
+        let way = ways.iter().find(|(result, _)| enterable(body) && *result == body.result);
+        Entry { address, by: way.map(|(_, i)| addresses[*i]), site: body.entry_site.0 }
     });
     let image_size = program.image_size.into();
     Ok(Code {
@@ -77,11 +79,9 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
     })
 }
 
-/// What bodies that can be run from outside may return.
-const ENTRIES: [Option<Ty>; 4] = [None, Some(Ty::I64), Some(Ty::F32), Some(Ty::F64)];
-
-fn entry_of(result: Option<Ty>) -> Option<usize> {
-    ENTRIES.iter().position(|entry| *entry == result)
+/// Whether a body can be run from outside: without parameters, with a result that is a value.
+fn enterable(body: &Body) -> bool {
+    body.params == 0 && !matches!(body.result, Some(Ty::Addr(_)))
 }
 
 /// Places functions beside each other and connects them; addresses in order.

@@ -13,6 +13,7 @@ mod body;
 mod code;
 mod defect;
 mod machine;
+mod place;
 mod runtime;
 mod stack;
 

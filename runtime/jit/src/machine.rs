@@ -3,13 +3,14 @@
 use crate::body;
 use crate::code::JitError;
 use crate::defect::Defect;
+use crate::place;
 use cranelift_codegen::Context;
 use cranelift_codegen::control::ControlPlane;
 use cranelift_codegen::ir::{AbiParam, Function, InstBuilder, MemFlagsData, Signature, UserFuncName, types};
 use cranelift_codegen::isa::{CallConv, OwnedTargetIsa, TargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
-use cranelift_module::{FuncId, ModuleReloc};
+use cranelift_module::{FuncId, ModuleReloc, ModuleRelocTarget};
 use std::mem::offset_of;
 use takt_ir::{Program, Ty};
 
@@ -38,6 +39,7 @@ pub(crate) fn host() -> Result<OwnedTargetIsa, JitError> {
         ("enable_probestack", "true"),
         ("probestack_strategy", "inline"),
         ("unwind_info", "false"),
+        ("machine_code_cfg_info", "true"),
     ];
     for (name, value) in wanted {
         flags.set(name, value).map_err(|e| JitError::Machine(e.to_string()))?;
@@ -156,11 +158,24 @@ impl<'a> Maker<'a> {
         let done = done.map(|(bytes, align, frame)| {
             let relocations = self.context.compiled_code().map_or(&[][..], |c| c.buffer.relocs());
             let relocations = relocations.iter().map(|r| ModuleReloc::from_mach_reloc(r, &self.context.func, id)).collect();
-            Compiled { bytes, align, relocations, frame }
+            let shift = self.context.compiled_code().map_or(0, |c| place::shift(&c.bb_starts, &c.bb_edges, bytes.len() as u32));
+            shifted(Compiled { bytes, align, relocations, frame }, shift)
         });
         self.context.clear();
         done
     }
+}
+
+/// The function moved by `shift` bytes within its cache line.
+fn shifted(function: Compiled, shift: u32) -> Compiled {
+    let fixed = function.relocations.iter().any(|r| matches!(r.name, ModuleRelocTarget::FunctionOffset(..)));
+    let Some(mut bytes) = place::padding(shift).filter(|_| shift > 0 && !fixed) else { return function };
+    bytes.extend_from_slice(&function.bytes);
+    let mut relocations = function.relocations;
+    for relocation in &mut relocations {
+        relocation.offset += shift;
+    }
+    Compiled { bytes, align: function.align.max(place::LINE.into()), relocations, frame: function.frame }
 }
 
 /// Return address, frame pointer, saved registers, slots and outgoing arguments, rounded up.
