@@ -444,3 +444,6 @@ fn load_error(project: &Project, error: LoadError) -> BuildError {
         None => BuildError::Load(error),
     }
 }
+
+#[cfg(test)]
+mod tests;

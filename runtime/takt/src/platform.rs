@@ -1,4 +1,4 @@
-//! What depends on the operating system: a request to stop from the terminal or the system.
+//! What depends on the operating system: a request to stop, the width of the terminal.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -33,3 +33,19 @@ pub fn listen_for_stop() {
 /// Other systems end the process at once.
 #[cfg(not(unix))]
 pub fn listen_for_stop() {}
+
+/// Columns of the terminal at standard error, if it is one that tells.
+#[cfg(unix)]
+#[allow(unsafe_code, reason = "the standard library does not ask terminals for their size")]
+pub fn columns() -> Option<usize> {
+    let mut size = libc::winsize { ws_row: 0, ws_col: 0, ws_xpixel: 0, ws_ypixel: 0 };
+    // SAFETY: TIOCGWINSZ writes one `winsize` to the pointer, which is valid for the whole call; a file that is no terminal is refused.
+    let result = unsafe { libc::ioctl(libc::STDERR_FILENO, libc::TIOCGWINSZ, &raw mut size) };
+    (result == 0 && size.ws_col > 0).then(|| usize::from(size.ws_col))
+}
+
+/// Other systems do not tell.
+#[cfg(not(unix))]
+pub fn columns() -> Option<usize> {
+    None
+}

@@ -50,7 +50,7 @@ impl Live {
 
 /// Characters that fit behind the time.
 fn width() -> usize {
-    let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok()).unwrap_or(100usize);
+    let columns = crate::platform::columns().unwrap_or(100);
     columns.saturating_sub(15).max(20)
 }
 

@@ -100,3 +100,42 @@ fn rows(machine: &Machine, over: &Over, language: Language) -> Vec<(String, Stri
 fn cells(text: &str) -> usize {
     text.chars().map(|c| if (c as u32) < 0x1100 { 1 } else { 2 }).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Setup;
+    use crate::sources::Sources;
+    use takt_syntax::Source;
+
+    fn run(text: &str, scans: usize) -> Machine {
+        let source = Source { name: "main.st".into(), text: text.into() };
+        let sources = Sources { list: vec![source], converted: Vec::new() };
+        let project = Project { root: std::env::temp_dir(), sources, ..Project::default() };
+        let mut machine = Machine::new(&project, Setup::default()).unwrap_or_else(|error| panic!("{error}"));
+        (0..scans).for_each(|_| {
+            machine.step();
+        });
+        machine
+    }
+
+    #[test]
+    fn json_has_the_shape_of_the_contract() {
+        let machine = run("PROGRAM p VAR x : INT; END_VAR x := x + 2; END_PROGRAM", 3);
+        let place = machine.place("p.x").unwrap();
+        let json = to_json(&machine, &[("p.x".into(), place)]);
+        let scan_ns = json!({ "mean": 0, "p50": 0, "p99": 0, "max": 0 });
+        let expected =
+            json!({ "schema": 1, "cycles": 3, "time_ns": 30_000_000, "scan_ns": scan_ns, "fault": null, "values": { "p.x": 6 } });
+        assert_eq!(json, expected);
+    }
+
+    #[test]
+    fn a_fault_is_an_object_with_its_place() {
+        let machine = run("PROGRAM p\nVAR a, b : INT; END_VAR\na := a / b;\nEND_PROGRAM", 1);
+        let fault = &to_json(&machine, &[])["fault"];
+        let expected = json!({ "code": "division-by-zero", "message": "integer division by zero", "file": "main.st", "line": 3, "task": fault["task"], "stack": fault["stack"] });
+        assert_eq!(fault, &expected);
+        assert!(fault["task"].is_string() && fault["stack"].is_array());
+    }
+}

@@ -119,15 +119,18 @@ fn frequency(svg: &mut Svg, panel: Panel, data: &Data) {
     panel.heading(svg, title, &format!("f = v / {} mm{limit}", number(1.0 / slope.max(1e-9))));
     let top = |pick: fn(&(f64, f64)) -> f64| strokes.iter().map(pick).fold(0.0, f64::max);
     let (fastest, highest) = (top(|s| s.0), top(|s| s.1));
-    let x = Axis { low: 0.0, high: fastest * 1.15, title: "v / (mm/s)" };
-    let y = Axis { low: 0.0, high: highest * 1.15, title: "f / Hz" };
+    let cap = data.frequency_limit.filter(|limit| slope > 0.0 && *limit >= highest).map(|limit| (limit / slope, limit));
+    let corner = cap.unwrap_or((fastest, fastest * slope));
+    let x = Axis { low: 0.0, high: corner.0.max(fastest) * 1.2, title: "v / (mm/s)" };
+    let y = Axis { low: 0.0, high: corner.1.max(highest) * 1.15, title: "f / Hz" };
     let chart = frame(svg, panel, &x, &y);
-    svg.line((chart.x.at(0.0), chart.y.at(0.0)), (chart.x.at(fastest), chart.y.at(fastest * slope)), "fit");
-    if let Some(limit) = data.frequency_limit.filter(|limit| *limit <= y.high) {
-        svg.line((chart.x.at(0.0), chart.y.at(limit)), (chart.x.at(x.high), chart.y.at(limit)), "limit");
+    svg.line((chart.x.at(0.0), chart.y.at(0.0)), (chart.x.at(corner.0), chart.y.at(corner.1)), "fit");
+    if let Some((v, limit)) = cap {
+        svg.line((chart.x.at(v), chart.y.at(limit)), (chart.x.at(x.high), chart.y.at(limit)), "limit");
     }
     for (v, f) in &strokes {
         svg.circle((chart.x.at(*v), chart.y.at(*f)), 2.6, "point");
     }
-    legend(svg, panel, &[("point", "one stroke"), ("fit", "f ~ v")]);
+    let entries = [("point", "one stroke"), ("fit", "f ~ v"), ("limit", "limit")];
+    legend(svg, panel, if cap.is_some() { &entries } else { &entries[..2] });
 }

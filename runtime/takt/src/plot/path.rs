@@ -5,9 +5,9 @@ use super::scale::ticks;
 use super::svg::{Anchor, Svg};
 use super::{Data, Sample};
 
-/// Direction of view: azimuth -60°, elevation 30°, so that x runs to the right and y to the back.
+/// Direction of view: azimuth -60°, elevation 35°, so that x runs to the right and y to the back.
 const RIGHT: [f64; 3] = [0.866_025_403_784_438_6, 0.5, 0.0];
-const UP: [f64; 3] = [-0.25, 0.433_012_701_892_219_3, 0.866_025_403_784_438_6];
+const UP: [f64; 3] = [-0.286_788_218_175_523, 0.496_731_764_607_165_5, 0.819_152_044_288_991_8];
 
 /// What is drawn upon the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +74,7 @@ impl View {
         let ([x0, y0, z0], [x1, y1, z1]) = (self.low, self.high);
         let corners = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]].map(|corner| self.at(corner));
         svg.polygon(&corners, "floor");
-        let count = |low: f64, high: f64| ((high - low) * self.scale / 70.0).max(2.0);
+        let count = |low: f64, high: f64| ((high - low) * self.scale / 50.0).max(3.0);
         for (x, label) in ticks(x0, x1, count(x0, x1)) {
             svg.line(self.at([x, y0, z0]), self.at([x, y1, z0]), "grid");
             let (sx, sy) = self.at([x, y0, z0]);
