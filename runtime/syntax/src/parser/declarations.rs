@@ -53,7 +53,7 @@ impl Parser<'_> {
             if self.kind() == Kind::Ident {
                 self.respell();
             }
-            let brackets = self.brackets;
+            let (brackets, before) = (self.brackets, self.at);
             if self.eat(Kind::Semi) {
                 continue;
             }
@@ -71,6 +71,9 @@ impl Parser<'_> {
             }
             if self.failed {
                 self.recover_declaration(brackets);
+            }
+            if self.at == before {
+                self.bump();
             }
         }
     }

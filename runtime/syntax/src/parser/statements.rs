@@ -393,7 +393,11 @@ impl Parser<'_> {
                     let message = "a label behind the `ELSE` of its `CASE`";
                     self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(self.token()), message));
                 }
+                let before = self.at;
                 let labels = self.case_labels();
+                if self.at == before {
+                    self.bump();
+                }
                 arms.push((labels, self.statement_list(true)));
             } else if self.eat(Kind::Else) {
                 let body = self.statement_list(true);

@@ -714,6 +714,32 @@ fn no_nonsense_makes_it_panic_or_hang() {
 }
 
 #[test]
+fn programs_with_many_mistakes_end() {
+    let tokens = lexer::lex(FILE, MACHINE).tokens;
+    let mut state = 0x2545_F491_4F6C_DD1D_u64;
+    let mut random = move |below: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state % below as u64) as usize
+    };
+    for _ in 0..2000 {
+        let mut pieces: Vec<&str> = tokens.iter().map(|token| &MACHINE[token.start as usize..token.end as usize]).collect();
+        for _ in 0..1 + random(12) {
+            let (one, other) = (random(pieces.len()), random(pieces.len()));
+            match random(3) {
+                0 => drop(pieces.remove(one)),
+                1 => pieces.swap(one, other),
+                _ => pieces.insert(one, pieces[other]),
+            }
+        }
+        let text: String = pieces.iter().flat_map(|piece| [*piece, [" ", "\n"][random(2)]]).collect();
+        parse(FILE, &text);
+    }
+    parse(FILE, "PROGRAM p CASE a OF NOT => 1: b(); END_CASE END_PROGRAM");
+}
+
+#[test]
 fn any_bytes_are_survived() {
     let mut state = 88_172_645_463_325_252_u64;
     for _ in 0..2000 {

@@ -205,7 +205,7 @@ impl Parser<'_> {
         let mut block_doc = self.doc_before(index);
         let mut list = Vec::new();
         loop {
-            let brackets = self.brackets;
+            let (brackets, before) = (self.brackets, self.at);
             if self.is_block_boundary() {
                 break;
             }
@@ -223,6 +223,9 @@ impl Parser<'_> {
             }
             if self.failed {
                 self.recover_type(brackets);
+            }
+            if self.at == before {
+                self.bump();
             }
         }
         self.close_block();
