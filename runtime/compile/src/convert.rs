@@ -94,6 +94,11 @@ impl Lowering<'_, '_> {
         let (fl, fh) = range(from);
         let fits = low <= fl && high >= fh;
         self.maybe_lossy(&a, to, fits);
+        if matches!(a.kind, Kind::Place(_)) {
+            // read as what it is: its place has another width than the type it becomes
+            let local = self.value(&a);
+            return Operand { exact: fits, ..self.exact(local, to, a.span) };
+        }
         // The sum of two WORDs may exceed WORD until it is stored: what is computed in 64 bits stays uncut here.
         Operand { ty: to, exact: a.exact && fits, flex: false, ..a }
     }

@@ -498,7 +498,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
             }
         }
         let Some(field) = found else { return self.no_member(&operand, member) };
-        if kind == StructKind::Block && matches!(field.section, Section::State | Section::InOut) {
+        // A block sees all of its own type: `THIS^.x`.
+        let foreign = kind == StructKind::Block && self.c.pou_of_type.get(&operand.ty).copied() != self.pou;
+        if foreign && matches!(field.section, Section::State | Section::InOut) {
             let what = if field.section == Section::InOut { "VAR_IN_OUT" } else { "VAR" };
             self.report(
                 Code::NotAccessible,
@@ -510,7 +512,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
         let Kind::Place(place) = operand.kind else { return Thing::Error };
         let mut value = self.at(place.inside(field.offset), field.ty, span);
         value.fixed = operand.fixed;
-        if kind == StructKind::Block && field.section == Section::Output {
+        if foreign && field.section == Section::Output {
             value.fixed = Some(BLOCK_OUTPUT);
         }
         Thing::Value(value)

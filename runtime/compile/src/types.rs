@@ -139,7 +139,11 @@ impl<'a> Compiler<'a> {
             Some(Item::Ready(ty) | Item::NativeBlock(ty)) => ty,
             Some(Item::Pou(i)) if self.pous[i].tree.kind != PouKind::Function => {
                 if direct {
+                    let inside_itself = self.pous[i].state == Progress::Running;
                     self.resolve_pou(i, span);
+                    if inside_itself {
+                        return self.error_type();
+                    }
                 }
                 self.pou_type(i)
             }
@@ -477,7 +481,7 @@ impl<'a> Compiler<'a> {
     pub(crate) fn suggest(&self, name: &str, types_only: bool) -> Option<String> {
         let wanted = key(name);
         let usable = |item: &Item| !types_only || matches!(item, Item::Type(_) | Item::Ready(_) | Item::NativeBlock(_) | Item::Pou(_));
-        let elementary = ELEMENTARY.iter().filter(|_| types_only).map(|(n, _)| (*n).to_string());
+        let elementary = ELEMENTARY.iter().map(|(n, _)| *n).chain(["STRING", "WSTRING"]).filter(|_| types_only).map(String::from);
         let known = self.names.iter().chain(&self.library_names).filter(|(_, i)| usable(i)).map(|(n, _)| n.clone());
         nearest(&wanted, known.chain(elementary)).map(|n| format!("did you mean `{n}`?"))
     }
@@ -485,7 +489,8 @@ impl<'a> Compiler<'a> {
 
 /// The candidate with the smallest edit distance, if it is near; ties by name.
 pub(crate) fn nearest(wanted: &str, known: impl Iterator<Item = String>) -> Option<String> {
-    let limit = 1 + wanted.chars().count() / 4;
+    let length = wanted.chars().count();
+    let limit = (1 + length / 4).min(length.saturating_sub(1));
     known.filter_map(|n| Some((distance(wanted, &n, limit)?, n))).min().map(|(_, n)| n)
 }
 
