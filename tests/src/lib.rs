@@ -1,4 +1,9 @@
-//! The test bench: cases as data, run in both executors and compared bit for bit.
+//! The test bench: cases as data and random programs, run in both executors and compared bit for bit.
 
+pub mod agreement;
 pub mod bench;
 pub mod case;
+pub mod coverage;
+pub mod generate;
+pub mod shrink;
+pub mod trial;
