@@ -283,8 +283,8 @@ fn a_million_lines_start_at_once() {
     let mut bench = Bench::ready("long");
     let mut text = String::from("G90\nG00 X0 Y0 Z30 A0 B0 C0\nF60\n");
     for i in 0..1_000_000 {
-        let (x, y) = (f64::from(i % 4000) * 0.01, f64::from(i / 4000) * 0.01);
-        let x = if i / 4000 % 2 == 0 { x } else { 40.0 - x };
+        let (x, y) = (f64::from(i % 800) * 0.05, f64::from(i / 800) * 0.05);
+        let x = if i / 800 % 2 == 0 { x } else { 40.0 - x };
         text.push_str(&format!("G01 X{x:.3} Y{y:.3}\n"));
     }
     bench.file("long.cnc", text);
@@ -292,7 +292,7 @@ fn a_million_lines_start_at_once() {
     let before = bench.machine.elapsed();
     bench.press("Load");
     bench.wait_for("Loaded", 1.0);
-    let loaded = (bench.machine.elapsed() - before).seconds();
+    let loaded = bench.machine.elapsed().seconds() - before.seconds();
     println!("loaded after {loaded} s");
     assert!(loaded <= 0.3, "{loaded} s");
     bench.press("Start");

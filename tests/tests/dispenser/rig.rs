@@ -146,7 +146,12 @@ impl Bench {
     pub fn wait_for(&mut self, state: &str, seconds: f64) {
         let end = self.machine.elapsed().0 + (seconds * 1e9) as i64;
         while self.state() != state {
-            assert!(self.machine.elapsed() < Time(end), "waited for {state}, the machine is {}: {}", self.state(), self.text("GVL.ErrorText"));
+            assert!(
+                self.machine.elapsed() < Time(end),
+                "waited for {state}, the machine is {}: {}",
+                self.state(),
+                self.text("GVL.ErrorText")
+            );
             self.step();
         }
     }
@@ -217,6 +222,10 @@ fn copy(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).expect("the program is there") {
         let entry = entry.expect("the program is there");
         let target = to.join(entry.file_name());
-        if entry.path().is_dir() { copy(&entry.path(), &target) } else { drop(fs::copy(entry.path(), &target).expect("the folder is ours")) }
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target)
+        } else {
+            drop(fs::copy(entry.path(), &target).expect("the folder is ours"))
+        }
     }
 }
