@@ -198,7 +198,7 @@ impl<'a, 'f> Lowering<'a, 'f> {
         for (variable, value) in self.locals.clone().into_iter().zip(&params) {
             self.b.def_var(variable, *value);
         }
-        // A variable that is read before it is written is 0 by the contract of the front end; the entry says so for those of a defective one.
+        // Cranelift's front end makes a variable that is read before it is written 0, as the IR wants it.
         if self.is(Defect::LocalsDirty) {
             for local in params.len()..self.locals.len() {
                 if self.body.locals[local] == Ty::I64 {
