@@ -5,6 +5,8 @@
 
 pub mod clock;
 pub mod commands;
+pub mod console;
+
 pub mod host;
 pub mod language;
 pub mod machine;

@@ -5,22 +5,23 @@
 
 mod binding;
 mod bus;
+mod error;
 mod operator;
 
 pub use binding::{PlotPlaces, Shown, View};
 pub use bus::Bus;
+pub use error::{BuildError, End, VariableError};
 
 use crate::host;
-use crate::manifest::{Located, ManifestError, ManifestErrors};
+use crate::manifest::{Located, ManifestError};
 use crate::program::{Compiled, Condition};
 use crate::project::Project;
 use crate::values;
 use operator::Operator;
-use std::fmt;
 use std::sync::Arc;
-use takt_abi::{Fault, Time};
+use takt_abi::Time;
 use takt_engine::{Clock, Engine, ExecutorKind, FaultRecord, LoadError};
-use takt_ir::{BodyId, Place, Program, SymbolError, Trigger, ValueError};
+use takt_ir::{BodyId, Place, Program, Trigger};
 
 /// How a machine is to be run.
 #[derive(Debug, Clone, Default)]
@@ -33,98 +34,6 @@ pub struct Setup {
     pub stopwatch: Option<fn() -> u64>,
     /// An ST condition that ends the run.
     pub until: Option<String>,
-}
-
-/// Why a machine cannot be built.
-#[derive(Debug)]
-pub enum BuildError {
-    /// The sources or conditions have errors.
-    Program(Box<Compiled>),
-    /// The manifest names what the program does not have.
-    Manifest(ManifestErrors),
-    /// The engine refuses the program.
-    Load(LoadError),
-    /// The bus cannot be opened.
-    Bus(String),
-    /// The file service cannot be started.
-    Files(std::io::Error),
-}
-
-impl fmt::Display for BuildError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Program(compiled) => {
-                let (errors, _) = compiled.counts();
-                write!(f, "the program has {errors} errors")?;
-                for diagnostic in &compiled.diagnostics {
-                    let spot = compiled.locate(diagnostic.span);
-                    let place = crate::manifest::Place::of(spot.text, spot.range.start);
-                    write!(f, "\n{}:{}:{}: {} {}", spot.file, place.line, place.column, diagnostic.code.text(), diagnostic.message)?;
-                }
-                Ok(())
-            }
-            Self::Manifest(errors) => write!(f, "{errors}"),
-            Self::Load(error) => write!(f, "{error}"),
-            Self::Bus(message) => write!(f, "the simulated bus: {message}"),
-            Self::Files(error) => write!(f, "the file service: {error}"),
-        }
-    }
-}
-impl std::error::Error for BuildError {}
-
-/// Why a variable cannot be read or written from outside.
-#[derive(Debug, Clone, PartialEq)]
-pub enum VariableError {
-    /// There is no such variable.
-    Name(SymbolError),
-    /// The text is no value of its type.
-    Value(ValueError),
-    /// It has another type than asked for.
-    Kind {
-        /// The variable.
-        path: String,
-        /// Its type.
-        found: String,
-        /// What was asked for.
-        expected: &'static str,
-    },
-    /// It is a constant.
-    Constant(String),
-}
-
-impl fmt::Display for VariableError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Name(error) => write!(f, "{error}"),
-            Self::Value(error) => write!(f, "{error}"),
-            Self::Kind { path, found, expected } => write!(f, "`{path}` is `{found}`, expected {expected}"),
-            Self::Constant(path) => write!(f, "`{path}` is a constant"),
-        }
-    }
-}
-impl std::error::Error for VariableError {}
-
-/// Why a run is over.
-#[derive(Debug, Clone, PartialEq)]
-pub enum End {
-    /// The condition of `--until`.
-    Until,
-    /// The manifest says that the demonstration is over.
-    Done,
-    /// It was not over in its time; with what the operator waited for.
-    TimedOut {
-        /// The condition, as it stands in the manifest.
-        waiting_for: String,
-    },
-    /// The program faulted; see [`Machine::fault`].
-    Fault,
-    /// A condition cannot be evaluated.
-    Condition {
-        /// The condition.
-        text: String,
-        /// Why.
-        fault: Fault,
-    },
 }
 
 /// A condition with its text.
@@ -166,7 +75,8 @@ impl Machine {
         let Some(program) = compiled.program.take() else { return Err(BuildError::Program(Box::new(compiled))) };
         let watch = |index: Option<usize>| index.map(|i| Watch { text: conditions.list[i].text.clone(), body: compiled.conditions[i] });
 
-        let bus = bus::open(&project.manifest, bus_period(project, &program)).map_err(BuildError::Bus)?;
+        let bus = bus::open(&project.manifest, bus_period(project, &program))
+            .map_err(|error| BuildError::Manifest(project.errors(vec![error])))?;
         let bound = binding::bind(project, &program, &bus.channels).map_err(BuildError::Manifest)?;
         let operator = Operator::new(bound.steps, waits.into_iter().map(watch).collect());
         let options = takt_engine::Options {

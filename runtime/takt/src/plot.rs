@@ -91,7 +91,7 @@ impl Recording {
             self.data.dots.push(sample);
         }
         self.count = count;
-        if self.scans % self.stride == 0 {
+        if self.scans.is_multiple_of(self.stride) {
             self.data.samples.push(sample);
         }
         self.scans += 1;

@@ -32,7 +32,7 @@ fn scalar(types: &Types, ty: TypeId, shape: &Type, bytes: &[u8]) -> Value {
     use takt_abi::Elem::{Char, Date, Dt, Ldate, Ldt, Ltime, Ltod, Time, Tod, Wchar};
     let literal = || Value::String(format_value(types, ty, bytes));
     match shape {
-        Type::Elem(Time | Ltime | Date | Ldate | Tod | Ltod | Dt | Ldt | Char | Wchar) | Type::Enum(_) => return literal(),
+        Type::Elem(Time | Ltime | Date | Ldate | Tod | Ltod | Dt | Ldt | Char | Wchar) => return literal(),
         _ => {}
     }
     match read_scalar(types, ty, bytes) {

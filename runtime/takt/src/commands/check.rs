@@ -1,6 +1,7 @@
 //! `takt check`: everything there is to say about a program.
 
 use super::{Exit, Format};
+use crate::console;
 use crate::language::{self, Word};
 use crate::manifest::Located;
 use crate::messages;
@@ -17,7 +18,7 @@ pub(super) fn execute(paths: &[PathBuf], format: Format) -> Exit {
     let compiled = program::compile(&project, &conditions(&project));
     match format {
         Format::Text => tell(&compiled),
-        Format::Json => compiled.diagnostics.iter().for_each(|d| println!("{}", messages::to_json(d, &|span| compiled.locate(span)))),
+        Format::Json => compiled.diagnostics.iter().for_each(|d| console::result(messages::to_json(d, &|span| compiled.locate(span)))),
     }
     let (errors, warnings) = compiled.counts();
     if format == Format::Text {
@@ -44,7 +45,7 @@ fn bound(project: &Project, format: Format) -> Exit {
         Ok(_) => Exit::Good,
         Err(crate::machine::BuildError::Manifest(errors)) => refuse(&ProjectError::Manifest(errors), format),
         Err(error) => {
-            anstream::eprintln!("{error}");
+            console::tell(error);
             Exit::Findings
         }
     }
@@ -53,7 +54,7 @@ fn bound(project: &Project, format: Format) -> Exit {
 /// Draws every diagnostic on standard error.
 pub(super) fn tell(compiled: &Compiled) {
     for diagnostic in &compiled.diagnostics {
-        anstream::eprintln!("{}\n", messages::draw(diagnostic, &|span| compiled.locate(span)));
+        console::tell(format_args!("{}\n", messages::draw(diagnostic, &|span| compiled.locate(span))));
     }
 }
 
@@ -65,17 +66,19 @@ pub(super) fn summarise(errors: usize, warnings: usize) {
         _ => format!("{n} {}", many.text(language)),
     };
     match (errors, warnings) {
-        (0, 0) => anstream::eprintln!("{}", Word::NoFindings.text(language)),
-        _ => anstream::eprintln!("{}, {}", count(errors, Word::Error, Word::Errors), count(warnings, Word::Warning, Word::Warnings)),
+        (0, 0) => console::tell(Word::NoFindings.text(language)),
+        _ => {
+            console::tell(format_args!("{}, {}", count(errors, Word::Error, Word::Errors), count(warnings, Word::Warning, Word::Warnings)))
+        }
     }
 }
 
 /// Says why a project cannot be read.
 pub(super) fn refuse(error: &ProjectError, format: Format) -> Exit {
     match (error, format) {
-        (ProjectError::Manifest(errors), Format::Json) => messages::manifest_to_json(errors).iter().for_each(|json| println!("{json}")),
-        (ProjectError::Manifest(errors), Format::Text) => anstream::eprintln!("{}\n", messages::draw_manifest(errors)),
-        _ => anstream::eprintln!("{}: {error}", Word::Error.text(language::of_environment())),
+        (ProjectError::Manifest(errors), Format::Json) => messages::manifest_to_json(errors).iter().for_each(console::result),
+        (ProjectError::Manifest(errors), Format::Text) => console::tell(format_args!("{}\n", messages::draw_manifest(errors))),
+        _ => console::tell(format_args!("{}: {error}", Word::Error.text(language::of_environment()))),
     }
     Exit::Usage
 }

@@ -2,12 +2,15 @@
 
 use super::{EngineKind, Exit, Format, RunArgs, Speed, check, live::Live, summary};
 use crate::clock::{self, Pace};
+use crate::console;
 use crate::language::{self, Word};
 use crate::machine::{BuildError, End, Machine, Setup};
 use crate::plot::Recording;
 use crate::project::{self, Project};
 use crate::trace::{self, Trace};
 use crate::{messages, platform};
+use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 use takt_abi::Time;
 use takt_engine::{Clock, ExecutorKind};
@@ -42,14 +45,16 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     }
     let printed = places(&machine, &args.print, "--print")?;
     let mut outputs = Outputs::open(args, &machine)?;
+    let started = clock::nanoseconds();
     let over = turn(args, &mut machine, speed, &mut outputs);
+    let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
     outputs.finish(args)?;
     if args.json {
-        println!("{}", summary::to_json(&machine, &printed));
+        console::result(summary::to_json(&machine, &printed));
     } else {
-        printed.iter().for_each(|(name, place)| println!("{name} = {}", literal(&machine, *place)));
+        printed.iter().for_each(|(name, place)| console::result(format_args!("{name} = {}", literal(&machine, *place))));
     }
-    summary::tell(&project, &machine, &over, args.json);
+    summary::tell(&project, &machine, &over, (!args.json).then_some(wall));
     let bad = matches!(over, Over::End(End::Fault | End::TimedOut { .. } | End::Condition { .. }));
     Ok(if bad { Exit::Findings } else { Exit::Good })
 }
@@ -59,7 +64,7 @@ fn speed(args: &RunArgs, project: &Project) -> Speed {
     let ends = args.cycles.is_some() || args.duration.is_some() || args.until.is_some();
     let demonstration = project.manifest.simulation.as_ref().is_some_and(|s| s.done.is_some());
     if args.speed.is_none() && demonstration && !ends && !args.json {
-        anstream::eprintln!("{}", Word::Demonstration.text(language::of_environment()));
+        console::tell(Word::Demonstration.text(language::of_environment()));
     }
     args.speed.unwrap_or(if ends || demonstration { Speed::Max } else { Speed::Factor(1.0) })
 }
@@ -86,7 +91,7 @@ fn refuse(error: &BuildError) -> Exit {
             if compiled.diagnostics.iter().any(of_user) { Exit::Findings } else { Exit::Usage }
         }
         BuildError::Manifest(errors) => {
-            anstream::eprintln!("{}\n", messages::draw_manifest(errors));
+            console::tell(format_args!("{}\n", messages::draw_manifest(errors)));
             Exit::Usage
         }
         BuildError::Load(takt_engine::LoadError::Initial(_)) => {
@@ -98,7 +103,7 @@ fn refuse(error: &BuildError) -> Exit {
 }
 
 fn usage(message: &str) -> Exit {
-    anstream::eprintln!("{}: {message}", Word::Error.text(language::of_environment()));
+    console::tell(format_args!("{}: {message}", Word::Error.text(language::of_environment())));
     Exit::Usage
 }
 
@@ -117,7 +122,7 @@ fn literal(machine: &Machine, place: Place) -> String {
 /// What is written while it runs.
 struct Outputs {
     trace: Option<(Trace, Vec<Place>)>,
-    plot: Option<Recording>,
+    plot: Option<(Recording, File)>,
     live: Live,
     failed: Option<std::io::Error>,
 }
@@ -134,7 +139,7 @@ impl Outputs {
         };
         let plot = match (&args.plot, &machine.view().plot) {
             (None, _) => None,
-            (Some(_), Some(places)) => Some(Recording::new(places)),
+            (Some(path), Some(places)) => Some((Recording::new(places), File::create(path).map_err(|error| cannot_write(path, &error))?)),
             (Some(_), None) => return Err(usage("--plot: the manifest has no [plot]; docs/manifest.md shows one")),
         };
         Ok(Self { trace, plot, live: Live::new(!args.json), failed: None })
@@ -148,7 +153,7 @@ impl Outputs {
                 self.failed.get_or_insert(error);
             }
         }
-        if let Some(plot) = &mut self.plot
+        if let Some((plot, _)) = &mut self.plot
             && machine.is_plotted()
         {
             plot.add(machine);
@@ -162,11 +167,11 @@ impl Outputs {
         if let (Some((trace, _)), Some(path)) = (self.trace.take(), &args.trace) {
             let failed = self.failed.take().map_or_else(|| trace.finish(), Err);
             failed.map_err(|error| cannot_write(path, &error))?;
-            anstream::eprintln!("{}: {}", Word::TraceWritten.text(language), path.display());
+            console::tell(format_args!("{}: {}", Word::TraceWritten.text(language), path.display()));
         }
-        if let (Some(plot), Some(path)) = (self.plot.take(), &args.plot) {
-            std::fs::write(path, plot.draw()).map_err(|error| cannot_write(path, &error))?;
-            anstream::eprintln!("{}: {}", Word::PlotWritten.text(language), path.display());
+        if let (Some((plot, mut file)), Some(path)) = (self.plot.take(), &args.plot) {
+            file.write_all(plot.draw().as_bytes()).map_err(|error| cannot_write(path, &error))?;
+            console::tell(format_args!("{}: {}", Word::PlotWritten.text(language), path.display()));
         }
         Ok(())
     }
@@ -230,6 +235,6 @@ fn rest(machine: &mut Machine, pace: &Pace) {
 pub(super) fn tell_encodings(project: &Project) {
     let language = language::of_environment();
     for (file, encoding) in &project.sources.converted {
-        anstream::eprintln!("{file} {} {}", Word::ReadAs.text(language), encoding.name());
+        console::tell(format_args!("{file} {} {}", Word::ReadAs.text(language), encoding.name()));
     }
 }

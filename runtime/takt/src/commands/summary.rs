@@ -1,7 +1,7 @@
 //! What is said at the end of a run: a short table for people, one object for tools.
 
 use super::run::Over;
-use crate::clock;
+use crate::console;
 use crate::language::{self, Language, Word};
 use crate::machine::{End, Machine};
 use crate::project::Project;
@@ -34,23 +34,21 @@ fn fault(record: &FaultRecord) -> Value {
     })
 }
 
-/// The table for people, on standard error; with `--json` only what went wrong.
-pub(super) fn tell(project: &Project, machine: &Machine, over: &Over, json: bool) {
+/// The table for people, on standard error, with the seconds of the wall clock that the run took; without them only what went wrong.
+pub(super) fn tell(project: &Project, machine: &Machine, over: &Over, wall: Option<f64>) {
     let language = language::of_environment();
     if let Some(why) = why(over, language) {
-        anstream::eprintln!("{why}");
+        console::tell(why);
     }
     if let (Over::End(End::Fault), Some(record)) = (over, machine.fault()) {
-        anstream::eprintln!("\x1b[1;31m{}\x1b[0m: {record}", Word::Fault.text(language));
+        console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}", Word::Fault.text(language)));
     }
-    if json {
-        return;
-    }
-    let rows = rows(machine, over, language);
+    let Some(wall) = wall else { return };
+    let rows = rows(machine, over, wall, language);
     let wide = rows.iter().map(|(label, _)| cells(label)).max().unwrap_or(0);
-    anstream::eprintln!("\x1b[1m{}\x1b[0m", project.name);
+    console::tell(format_args!("\x1b[1m{}\x1b[0m", project.name));
     for (label, value) in rows {
-        anstream::eprintln!("  {label}{}  {value}", " ".repeat(wide - cells(&label)));
+        console::tell(format_args!("  {label}{}  {value}", " ".repeat(wide - cells(&label))));
     }
 }
 
@@ -65,13 +63,12 @@ fn why(over: &Over, language: Language) -> Option<String> {
     }
 }
 
-fn rows(machine: &Machine, over: &Over, language: Language) -> Vec<(String, String)> {
+fn rows(machine: &Machine, over: &Over, wall: f64, language: Language) -> Vec<(String, String)> {
     let mut rows = Vec::new();
     let mut row = |word: Word, value: String| rows.push((word.text(language).to_string(), value));
     let statistics = machine.statistics();
     let times = &statistics.scan_ns;
     row(Word::Cycles, machine.cycles().to_string());
-    let wall = clock::nanoseconds() as f64 * 1e-9;
     let factor = machine.elapsed().seconds() / wall.max(1e-9);
     row(Word::MachineTime, format!("{:.3} s ({factor:.1} {})", machine.elapsed().seconds(), Word::RealTimeFactor.text(language)));
     if times.count() > 0 {

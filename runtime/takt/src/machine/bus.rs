@@ -1,10 +1,10 @@
 //! The simulated bus of a project: drives with the mechanics of the manifest, terminals, a valve.
 
-use crate::manifest::{Axis, AxisPlant, Manifest};
+use crate::manifest::{Axis, AxisPlant, Manifest, ManifestError};
 use crate::spelling::nearest;
 use takt_abi::Time;
 use takt_engine::{Channel, Encoder, Home, IoDriver};
-use takt_io::sim::{self, DriveConfig, SimConfig, SimControl, Switches, ValveConfig};
+use takt_io::sim::{self, DriveConfig, OpenError, SimConfig, SimControl, Switches, ValveConfig};
 
 /// Share of the travel that the hard stops lie beyond the software limits, if the manifest does not say where.
 const BEYOND: f64 = 0.05;
@@ -57,13 +57,17 @@ impl Channels {
 }
 
 /// Opens the bus of a manifest with a bus cycle of `period`.
-pub(super) fn open(manifest: &Manifest, period: Time) -> Result<Open, String> {
+pub(super) fn open(manifest: &Manifest, period: Time) -> Result<Open, ManifestError> {
     let sim = &manifest.sim;
     for plant in &sim.axes {
         let names = || manifest.axes.iter().map(|axis| axis.name.value.as_str());
         if !names().any(|name| name.eq_ignore_ascii_case(&plant.name.value)) {
-            let near = nearest(&plant.name.value, names()).map_or_else(String::new, |name| format!("; did you mean [sim.axis.{name}]?"));
-            return Err(format!("[sim.axis.{0}] has no [axis.{0}]{near}", plant.name.value));
+            let help = nearest(&plant.name.value, names()).map_or_else(String::new, |name| format!("did you mean [sim.axis.{name}]?"));
+            return Err(ManifestError {
+                span: plant.name.span.clone(),
+                message: format!("[sim.axis.{0}] has no [axis.{0}]", plant.name.value),
+                help,
+            });
         }
     }
     let plant = |axis: &Axis| sim.axes.iter().find(|plant| plant.name.value.eq_ignore_ascii_case(&axis.name.value));
@@ -81,9 +85,24 @@ pub(super) fn open(manifest: &Manifest, period: Time) -> Result<Open, String> {
             air: valve.air.as_ref().map(|air| air.value.clone()),
         }),
     };
-    let (driver, control) = sim::open(&config).map_err(|error| error.to_string())?;
+    let (driver, control) = sim::open(&config).map_err(|error| refused(manifest, &error))?;
     let channels = control.channels().into_iter().map(|(name, channel)| (format!("sim/{name}"), channel)).collect();
     Ok(Open { driver, bus: Bus { control }, channels: Channels(channels) })
+}
+
+/// A refusal of the simulation, shown at the axis or input that it is about.
+fn refused(manifest: &Manifest, error: &OpenError) -> ManifestError {
+    let of = match error {
+        OpenError::Twice { name } | OpenError::NoInput { name } => name,
+        OpenError::Range { of, .. } | OpenError::Method { of, .. } | OpenError::NoSwitch { of, .. } => of,
+        OpenError::Period => "",
+    };
+    let sim = &manifest.sim;
+    let inputs = sim.inputs.iter().chain(&sim.analog).map(|input| &input.name);
+    let air = sim.valve.iter().filter_map(|valve| valve.air.as_ref());
+    let mut places = manifest.axes.iter().map(|axis| &axis.name).chain(air).chain(inputs).chain(&sim.outputs).chain(&sim.analog_outputs);
+    let span = places.find(|place| place.value == *of).map_or(0..0, |place| place.span.clone());
+    ManifestError { span, message: format!("the simulated bus: {error}"), help: String::new() }
 }
 
 fn drive(axis: &Axis, plant: Option<&AxisPlant>) -> DriveConfig {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::sources::Sources;
+use takt_abi::Fault;
 use takt_syntax::Source;
 
 const GVL: &str = "VAR_GLOBAL\nX : AXIS_REF_SM3;\nGo, Stop, Done, Lamp : BOOL;\nTarget : LREAL := 10.0;\nPressure : LREAL;\nEND_VAR\nVAR_GLOBAL CONSTANT\nFixed : INT := 3;\nEND_VAR\n";
@@ -111,6 +112,13 @@ fn every_name_that_does_not_exist_has_its_place() {
     check("\"GVL.Go\" = true", "\"GVL.Fixed\" = 12", "`GVL.Fixed` is a constant");
     check("{ stop = true }", "{ stp = true }", "the simulated bus has no input `stp` (did you mean `stop`?)");
     check("fActPosition", "fActPostion", "did you mean `fActPosition`?");
+    check("outputs = [\"lamp\"]", "outputs = [\"lamp\", \"oil\"]", "two channels are called `oil`");
+    check("[sim]", "[sim.axis.Y]\nstart = 1.0\n[sim]", "takt.toml:8:11: [sim.axis.Y] has no [axis.Y]");
+    check(
+        "velocity = 100.0, acceleration = 1000.0 }",
+        "velocity = 100.0, acceleration = 1000.0 }\nhome = { method = 21 }",
+        "takt.toml:1:7: the simulated bus: `X`",
+    );
     check("Done AND Lamp", "Done AND Lmap", "takt.toml:13:18: E0201");
 }
 
