@@ -120,7 +120,7 @@ fn check_refused(bench: &mut Bench, file: &str, expected: &str) {
     assert!(text.contains(expected), "{file}: expected `{expected}` in `{text}` ({})", bench.state());
     assert!(!bench.row().valve && !bench.machine.boolean("GVL.Out.Valve").expect("an output"));
     bench.press("Reset");
-    assert_eq!((bench.text("GVL.ErrorText").as_str(), bench.state().as_str()), ("", "Ready"));
+    assert_eq!((bench.text("GVL.ErrorText").as_str(), bench.state()), ("", "Ready"));
 }
 
 #[test]
@@ -165,6 +165,11 @@ fn bad_files_are_refused_with_their_place_and_the_machine_goes_on() {
     check_refused(&mut bench, "../takt.toml", "takt.toml");
     check_refused(&mut bench, "/etc/passwd", "passwd");
     check_refused(&mut bench, "", "");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("/etc/passwd", bench.folder().join("nc/link.cnc")).expect("the folder is ours");
+        check_refused(&mut bench, "link.cnc", "link.cnc");
+    }
     bench.set("GVL.NcFile", "'phone.cnc'");
     bench.press("Load");
     bench.wait_for("Loaded", 5.0);
@@ -279,6 +284,39 @@ fn a_machine_that_is_not_homed_or_whose_switches_stick_says_so() {
 }
 
 #[test]
+fn what_cannot_be_reached_behind_the_horizon_of_load_stops_the_machine_on_the_path_before_it() {
+    for (mode, bad, expected) in
+        [("FALSE", "G01 Z500\n", "D3"), ("TRUE", "G01 X30 A5\n", "A must be 0"), ("FALSE", "G01 X1e308\n", "late.cnc:3003:")]
+    {
+        let mut bench = Bench::ready("late");
+        let mut text = String::from("G90\nG00 X0 Y0 Z30 A0 B0 C0\nM08\n");
+        for i in 0..2999 {
+            text.push_str(&format!("G01 X{:.3} F20\n", f64::from(i + 1) * 0.02));
+        }
+        bench.file("late.cnc", text + bad + "G01 X0\nM30\n");
+        bench.set("GVL.NcFile", "'late.cnc'");
+        bench.set("GVL.PartSpaceMode", mode);
+        bench.start();
+        let mut rows = Vec::new();
+        while bench.state() == "Running" {
+            bench.step();
+            rows.push(bench.row());
+        }
+        while bench.number("GVL.Sts.Running") != 0.0 {
+            bench.step();
+            rows.push(bench.row());
+        }
+        let text = bench.text("GVL.ErrorText");
+        assert!(bench.state() == "Faulted" && text.contains(expected) && text.starts_with("late.cnc:3003"), "{text}");
+        assert!(rows.iter().all(|r| r.tcp[2] < 30.001 && r.tcp[0] < 60.0), "it has gone on");
+        check_axis_limits(&bench, &rows);
+        bench.run(0.1);
+        assert!(!bench.row().valve);
+        recover(&mut bench);
+    }
+}
+
+#[test]
 fn a_million_lines_start_at_once() {
     let mut bench = Bench::ready("long");
     let mut text = String::from("G90\nG00 X0 Y0 Z30 A0 B0 C0\nF60\n");
@@ -302,4 +340,97 @@ fn a_million_lines_start_at_once() {
     assert!(bench.number("GVL.Follow.PathLength") > 700.0, "{} mm", bench.number("GVL.Follow.PathLength"));
     bench.press("Stop");
     bench.wait_for("Ready", 5.0);
+}
+
+#[test]
+fn arcs_rapids_dwells_and_marks_take_effect_at_their_place() {
+    for mode in ["FALSE", "TRUE"] {
+        let mut bench = Bench::ready("words");
+        // a half circle of 20 mm about X30 Y0, a line with M08 in its middle, a dwell, a rapid back, a turn on the spot
+        bench.file(
+            "words.cnc",
+            "G90 G98 G17\nG00 X10 Y0 Z30 A0 B0 C0\nG02 X50 Y0 I30 J0 F40\nG01 X50 Y-10\nM08\nG01 X50 Y-50\nM09\nG04 T0.5\nG00 X10 Y0\nG01 C40 B10 F30\nM30\n",
+        );
+        bench.set("GVL.NcFile", "'words.cnc'");
+        bench.set("GVL.PartSpaceMode", mode);
+        let rows = bench.job();
+        check_axis_limits(&bench, &rows);
+        let arc: Vec<_> = rows.iter().filter(|r| r.tcp[1] > 0.1 && r.path < 62.0).collect();
+        assert!(arc.len() > 1000);
+        for row in arc {
+            let radius = distance(row.tcp, [30.0, 0.0, 30.0]);
+            assert!((radius - 20.0).abs() < 0.002, "{radius} mm from the centre");
+        }
+        let start = rows.iter().position(|r| r.dots == 1).expect("dots");
+        assert!(distance(rows[start].tcp, [50.0, -10.0, 30.0]) <= 0.041, "{:?}", rows[start].tcp);
+        assert!((rows[start].speed - 40.0).abs() < 0.3, "M08 stops nothing: {} mm/s", rows[start].speed);
+        assert_eq!(dots(&rows).len(), 25, "40 mm of dots");
+        let rest = rows.iter().filter(|r| distance(r.tcp, [50.0, -50.0, 30.0]) < 1e-6).count();
+        assert!((500..530).contains(&rest), "{rest} ms at the dwell");
+        let last = rows.last().expect("rows");
+        assert!(distance(last.tcp, [10.0, 0.0, 30.0]) < 1e-6 && (last.axes[0] + 40.0).abs() < 1e-6 && (last.axes[1] + 10.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn the_valve_never_fires_faster_than_it_can() {
+    let mut bench = Bench::ready("fast");
+    bench.file("fast.cnc", "G00 X0 Y0 Z30 A0 B0 C0\nM08\nG01 Y60 F95\nM09\nM30\n");
+    bench.set("GVL.NcFile", "'fast.cnc'");
+    bench.set("GVL.Par.DotPitch", "1.0");
+    let rows = bench.job();
+    let times: Vec<usize> = rows.windows(2).enumerate().filter(|(_, w)| w[1].dots > w[0].dots).map(|(i, _)| i).collect();
+    assert!(times.len() > 25 && times.windows(2).all(|w| w[1] - w[0] >= 20), "{times:?}");
+}
+
+#[test]
+fn an_axis_that_would_be_too_fast_slows_its_run_down() {
+    let mut bench = Bench::ready("slow");
+    bench.file("slow.cnc", "G00 X0 Y0 Z30 A0 B0 C0\nG01 X3 Y3 C170 F50\nM30\n");
+    bench.set("GVL.NcFile", "'slow.cnc'");
+    let rows = bench.job();
+    check_axis_limits(&bench, &rows);
+    assert!(bench.number("GVL.Sts.SlowedBy") < 1.0);
+}
+
+#[test]
+fn buttons_move_axes_and_stop_them_in_every_state() {
+    let mut bench = Bench::new("buttons");
+    bench.run(0.1);
+    bench.press("ControlOn");
+    bench.wait_for("Standby", 5.0);
+    bench.press("HomeAll");
+    bench.run(1.0);
+    bench.press("Stop");
+    bench.wait_for("Standby", 2.0);
+    bench.press("HomeAll");
+    bench.wait_for("Ready", 120.0);
+    let before = bench.row().axes[2];
+    bench.set("GVL.Cmd.JogPlus[3]", "TRUE");
+    bench.run(0.5);
+    assert_eq!(bench.state(), "Jogging");
+    bench.set("GVL.Cmd.JogPlus[3]", "FALSE");
+    bench.wait_for("Ready", 2.0);
+    assert!(bench.row().axes[2] > before + 5.0);
+    bench.press("Load");
+    bench.wait_for("Loaded", 2.0);
+    bench.press("Start");
+    bench.wait_for("Approaching", 1.0);
+    bench.press("Stop");
+    bench.wait_for("Ready", 5.0);
+    bench.start();
+    bench.run(5.0);
+    bench.press("Pause");
+    bench.wait_for("Paused", 1.0);
+    let still = bench.row().tcp;
+    bench.run(1.0);
+    assert_eq!(still, bench.row().tcp);
+    bench.press("Stop");
+    bench.wait_for("Ready", 1.0);
+    bench.press("ControlOff");
+    bench.wait_for("Off", 1.0);
+    bench.run(1.0);
+    bench.press("ControlOn");
+    bench.wait_for("Ready", 5.0);
+    assert_eq!(bench.text("GVL.ErrorText"), "");
 }

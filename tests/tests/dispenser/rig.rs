@@ -11,6 +11,26 @@ use takt_ir::Place;
 /// The axes by their names in `GVL`.
 pub const AXES: [&str; 5] = ["Theta1", "Theta2", "D1", "D2", "D3"];
 
+/// The members of `MachineState` in their order.
+const STATES: [&str; 16] = [
+    "Off",
+    "PoweringOn",
+    "Standby",
+    "Homing",
+    "Ready",
+    "Loading",
+    "Loaded",
+    "Approaching",
+    "Running",
+    "Pausing",
+    "Paused",
+    "Stopping",
+    "Done",
+    "Jogging",
+    "Faulted",
+    "EmergencyStop",
+];
+
 /// One scan of the 1 ms task.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -42,6 +62,7 @@ struct Places {
     constant: Place,
     override_: Place,
     valve: Place,
+    state: Place,
 }
 
 /// A machine and its operator.
@@ -76,6 +97,7 @@ impl Bench {
             constant: place("GVL.Follow.Constant"),
             override_: place("GVL.Follow.Override"),
             valve: place("GVL.ValveOpen"),
+            state: place("GVL.Sts.State"),
         };
         Self { machine, folder, places }
     }
@@ -89,6 +111,11 @@ impl Bench {
         bench.press("HomeAll");
         bench.wait_for("Ready", 60.0);
         bench
+    }
+
+    /// The project's copy.
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Puts a file into `nc/`.
@@ -112,9 +139,8 @@ impl Bench {
     }
 
     /// Name of the machine's state.
-    pub fn state(&self) -> String {
-        let literal = self.machine.literal("GVL.Sts.State").expect("a name of the contract");
-        literal.rsplit('.').next().unwrap_or_default().to_string()
+    pub fn state(&self) -> &'static str {
+        STATES.get(self.machine.number_at(self.places.state) as usize).copied().unwrap_or("?")
     }
 
     /// Lets the machine run.
@@ -185,7 +211,7 @@ impl Bench {
         while self.state() != "Done" {
             self.step();
             rows.push(self.row());
-            assert!(!self.state().contains("Faulted") && rows.len() < 400_000, "{}", self.text("GVL.ErrorText"));
+            assert!(self.state() != "Faulted" && rows.len() < 400_000, "{}", self.text("GVL.ErrorText"));
         }
     }
 
@@ -223,9 +249,9 @@ fn copy(from: &Path, to: &Path) {
         let entry = entry.expect("the program is there");
         let target = to.join(entry.file_name());
         if entry.path().is_dir() {
-            copy(&entry.path(), &target)
+            copy(&entry.path(), &target);
         } else {
-            drop(fs::copy(entry.path(), &target).expect("the folder is ours"))
+            fs::copy(entry.path(), &target).expect("the folder is ours");
         }
     }
 }
