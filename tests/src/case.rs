@@ -1,7 +1,7 @@
 //! Cases as they stand in `tests/suite`: a program and what must be true of it.
 //!
 //! `--- name check ---`: every line `// ^ CODE text` says that the line above it has a message with that code at the caret's column, whose text
-//! contains `text`; there must be no other message. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
+//! contains `text` (`// <- CODE text`: at column 1); there must be no other message. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
 //! expects (`_` does not), `every 10ms` is the step, `fault NAME at LINE:COL` expects the run to end so, `stack BODY:LINE …` its callers.
 
 /// A case.
@@ -50,6 +50,11 @@ pub fn expectations(source: &str) -> Vec<Expected> {
     let mut found = Vec::new();
     let mut code_line = 0;
     for (i, line) in source.lines().enumerate() {
+        if let Some(message) = line.strip_prefix("// <- ") {
+            let (code, text) = message.split_once(' ').unwrap_or((message, ""));
+            found.push(Expected { line: code_line, column: 1, code: code.into(), text: text.trim().into() });
+            continue;
+        }
         let caret = line.trim_start().starts_with("//").then(|| line.find('^')).flatten();
         let Some(at) = caret.filter(|at| line[..*at].trim_start().trim_start_matches('/').trim().is_empty()) else {
             code_line = i + 1;

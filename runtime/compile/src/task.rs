@@ -108,7 +108,7 @@ impl<'a> Compiler<'a> {
             match self.global_name(&program.ty.text) {
                 Some(Item::Pou(i)) if self.pous[i].tree.kind == PouKind::Program => {
                     programs.push(i);
-                    self.names.entry(key(&program.name.text)).or_insert(Item::Pou(i));
+                    self.second_name(&program.name, i);
                 }
                 _ => {
                     let help = self.suggest(&program.ty.text, true);
@@ -117,6 +117,18 @@ impl<'a> Compiler<'a> {
             }
         }
         programs
+    }
+
+    /// The instance name of a CONFIGURATION is a second name for the program.
+    fn second_name(&mut self, name: &tree::Name, pou: usize) {
+        if self.global_name(&name.text).is_some() {
+            return;
+        }
+        self.names.insert(key(&name.text), Item::Pou(pou));
+        let ty = self.pou_type(pou);
+        let offset = self.pous[pou].instance;
+        let doc = self.pous[pou].tree.doc.clone().unwrap_or_default();
+        self.program.globals.push(takt_ir::Global { name: name.text.clone(), bare: true, ty, offset, constant: false, doc });
     }
 
     fn task_arguments(&mut self, task: &'a tree::TaskDecl) -> (Trigger, u32) {

@@ -3,7 +3,8 @@
 use serde_json::{Map, Number, Value};
 use takt_ir::{Place, Scalar, Type, TypeId, Types, format_value, read_scalar};
 
-/// A value as DESIGN §9 says: numbers are JSON numbers, BOOL true or false, STRING text; times, dates and enumerators ST literals as text; NaN and the
+/// A value as DESIGN §9 says: numbers are JSON numbers, BOOL true or false, STRING text, an enumerator
+/// its number; times and dates ST literals as text; NaN and the
 /// infinities text; arrays and structures by element and member.
 pub fn to_json(types: &Types, ty: TypeId, bytes: &[u8]) -> Value {
     match types.get(ty) {
@@ -31,9 +32,8 @@ fn array(types: &Types, elem: TypeId, dims: &[(i64, i64)], bytes: &[u8]) -> Valu
 fn scalar(types: &Types, ty: TypeId, shape: &Type, bytes: &[u8]) -> Value {
     use takt_abi::Elem::{Char, Date, Dt, Ldate, Ldt, Ltime, Ltod, Time, Tod, Wchar};
     let literal = || Value::String(format_value(types, ty, bytes));
-    match shape {
-        Type::Elem(Time | Ltime | Date | Ldate | Tod | Ltod | Dt | Ldt | Char | Wchar) => return literal(),
-        _ => {}
+    if let Type::Elem(Time | Ltime | Date | Ldate | Tod | Ltod | Dt | Ldt | Char | Wchar) = shape {
+        return literal();
     }
     match read_scalar(types, ty, bytes) {
         Some(Scalar::Bool(bit)) => Value::Bool(bit),
