@@ -143,7 +143,7 @@ impl<'a> Lowering<'_, 'a> {
             let storage = self.storage[i].clone();
             self.initialise_variable(v, &storage);
         }
-        self.open_result(pou, result, place);
+        self.open_result(pou, result, place, &taken);
         self.open_locals_with(pou, &taken);
     }
 
@@ -159,7 +159,7 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
-    fn open_result(&mut self, pou: usize, result: Option<TypeId>, place: Option<Local>) {
+    fn open_result(&mut self, pou: usize, result: Option<TypeId>, place: Option<Local>, taken: &HashSet<String>) {
         let Some(ty) = result else { return };
         let span = self.c.pous[pou].tree.name.span;
         let storage = match place {
@@ -167,7 +167,12 @@ impl<'a> Lowering<'_, 'a> {
             None => {
                 let class = self.c.register(ty).unwrap_or(Ty::I64);
                 self.b.result = Some(class);
-                Storage::Register(self.b.local(class))
+                if taken.contains(&key(&self.c.pous[pou].tree.name.text)) {
+                    let (size, align) = self.c.types.layout(ty);
+                    Storage::Frame(self.b.slot(size, align))
+                } else {
+                    Storage::Register(self.b.local(class))
+                }
             }
         };
         self.default_value(ty, &storage, span);
@@ -277,7 +282,10 @@ impl<'a> Lowering<'_, 'a> {
                 let value = match class {
                     Ty::F32 => takt_ir::Const::F32(0),
                     Ty::F64 => takt_ir::Const::F64(0),
-                    _ => takt_ir::Const::I64(bytes.map_or(0, |b| signed(&b))),
+                    _ => {
+                        let value = i128::from(bytes.map_or(0, |b| signed(&b)));
+                        takt_ir::Const::I64(self.scalar(ty).map_or(value, |e| crate::constant::cut(value, e)) as i64)
+                    }
                 };
                 let value = self.b.constant(value);
                 self.store(&place, ty, value, true, span);

@@ -196,13 +196,22 @@ impl Generator {
             20 => self.power(&path, d),
             21 => self.part(&path, of),
             22 => self.from_real(d),
-            23 => format!("{}({})", self.random.pick(&["LEN", "SIZEOF"]), self.plain(&|s| matches!(s, Shape::Text(_))).unwrap_or_else(|| "'abc'".into())),
+            23 => format!("({path} + {})", self.text_measure()),
             24 => format!("FIND({}, {})", self.text(0), self.text(0)),
             25 => self.of_pointers().unwrap_or(path),
             26 => format!("STRING_TO_{}({})", s.name, self.text(d)),
             27 => self.ratio().unwrap_or(path),
             28 => format!("{}({path}, {})", self.random.pick(&["ADD", "SUB", "MUL", "MOD"]), self.int(d)),
             _ => path,
+        }
+    }
+
+    /// A number that a string has; SIZEOF is a literal, which a narrow type may not hold by itself.
+    fn text_measure(&mut self) -> String {
+        let text = self.plain(&|s| matches!(s, Shape::Text(_)));
+        match text {
+            Some(path) => format!("{}({path})", self.random.pick(&["LEN", "SIZEOF"])),
+            None => format!("LEN({})", self.quoted()),
         }
     }
 
@@ -216,7 +225,7 @@ impl Generator {
     }
 
     /// A divisor: never 0 in a tame program.
-    fn divisor(&mut self, of: &'static Scalar) -> String {
+    pub(super) fn divisor(&mut self, of: &'static Scalar) -> String {
         let place = if self.random.chance(60) { self.place_of(Class::Int) } else { None };
         match place {
             Some((path, _)) if self.wild && self.random.chance(40) => path,

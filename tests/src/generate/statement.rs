@@ -110,11 +110,15 @@ impl Generator {
 
     fn for_statement(&mut self, depth: usize) {
         let Some(counter) = self.counter() else { return self.assignment() };
-        let (from, to) = (self.random.below(6) as i64 - 2, self.random.below(8) as i64);
+        let signed = self.scope.iter().any(|v| v.path == counter && v.shape.scalar().is_some_and(|s| s.signed));
+        let (from, to) = (self.random.below(6) as i64 - if signed { 2 } else { 0 }, self.random.below(8) as i64);
         let head = match self.random.below(8) {
             0 => format!("{to} TO {from} BY -1"),
             1 => format!("{from} TO {to} BY {}", 1 + self.random.below(3)),
-            2 if self.wild => format!("{} TO {} BY {}", self.int(0), self.int(0), self.int(0)),
+            2 if self.wild => {
+                let step = self.divisor(named("DINT"));
+                format!("{} TO {} BY {step}", self.int(0), self.int(0))
+            }
             3 => format!("{from} TO ABS({}) MOD 9", self.int(0)),
             4 => format!("{from} TO {to} BY SEL({}, 1, 2)", self.boolean(1)),
             5 => format!("ABS({}) MOD 5 TO {to}", self.int(0)),
@@ -233,14 +237,16 @@ impl Generator {
         }
     }
 
-    /// A jump forwards.
+    /// A jump forwards. It stands in an IF of its own: directly in a CASE its label would be one of the CASE.
     fn jump(&mut self) {
         self.labels += 1;
         let label = format!("on{}", self.labels);
         let cond = self.boolean(1);
-        self.line(&format!("IF {cond} THEN JMP {label}; END_IF"));
+        self.line("IF TRUE THEN");
+        self.line(&format!("  IF {cond} THEN JMP {label}; END_IF"));
         self.some(0);
-        self.line(&format!("{label}:"));
+        self.line(&format!("  {label}:"));
+        self.line("END_IF");
     }
 
     /// `name := value` for the parameters, or the values alone where the order is known; `None` if a VAR_IN_OUT finds no variable.
