@@ -85,7 +85,7 @@ pub enum End {
         /// The condition, as it stands in the manifest.
         waiting_for: String,
     },
-    /// The program faulted; see [`Machine::fault`].
+    /// The program faulted; see [`crate::machine::Machine::fault`].
     Fault,
     /// A condition cannot be evaluated.
     Condition {
