@@ -393,6 +393,11 @@ impl Drive {
         if self.config.lag > 0.0 { own.min(0.9 * self.config.lag) } else { own }
     }
 
+    /// Speeds up to this one come from the rounding of set-points.
+    fn standing(&self) -> f64 {
+        2.0 / (self.config.increments_per_unit * self.dt)
+    }
+
     /// Errors the drive finds by itself.
     fn watch(&mut self) {
         match self.state {
@@ -400,7 +405,7 @@ impl Drive {
                 let [negative, positive, _] = self.switches();
                 if self.config.lag > 0.0 && (self.reference - self.plant.x).abs() > self.config.lag {
                     self.fail(FOLLOWING_ERROR);
-                } else if self.mode != 6 && (negative && self.rate < 0.0 || positive && self.rate > 0.0) {
+                } else if self.mode != 6 && (negative && self.rate < -self.standing() || positive && self.rate > self.standing()) {
                     self.fail(LIMIT_SWITCH);
                 }
             }
