@@ -173,8 +173,15 @@ native_fn! {
     pub fn STRING_TO_LTIME as StringToLtime(_cx, IN: Text) -> StLtime { Ok(StLtime(span(&IN.to_text()).unwrap_or(0))) }
 }
 
-const UNITS: [(&str, i128); 7] =
-    [("d", 86_400_000_000_000), ("h", 3_600_000_000_000), ("m", 60_000_000_000), ("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1000), ("ns", 1)];
+const UNITS: [(&str, i128); 7] = [
+    ("d", 86_400_000_000_000),
+    ("h", 3_600_000_000_000),
+    ("m", 60_000_000_000),
+    ("s", 1_000_000_000),
+    ("ms", 1_000_000),
+    ("us", 1000),
+    ("ns", 1),
+];
 
 fn duration(prefix: &str, ns: i128) -> Text {
     let mut result = String::from(prefix);

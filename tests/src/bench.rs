@@ -44,6 +44,7 @@ pub fn run_case(case: &Case) -> Result<(), String> {
     match case.kind.as_str() {
         "check" => check(case),
         "run" => run(case),
+        "ir" => run_ir(case),
         other => Err(format!("`{other}` is not a kind of case")),
     }
 }
@@ -68,9 +69,29 @@ fn run(case: &Case) -> Result<(), String> {
     let errors: Vec<_> = found(&output).into_iter().filter(|e| e.code.starts_with('E')).collect();
     let Some(program) = output.program else { return Err(format!("does not compile: {errors:?}")) };
     takt_ir::verify(&program).map_err(|e| format!("the verifier refuses it: {e}"))?;
+    both(program, &wave)
+}
+
+fn run_ir(case: &Case) -> Result<(), String> {
+    let wave = waveform(&case.source)?;
+    let known = |name: &str| {
+        let desc = takt_ir::text::NATIVES.iter().chain(takt_stdlib_fb::LIBRARY.functions).find(|d| d.name == name)?;
+        Some(takt_ir::Native { name: desc.name, call: desc.call })
+    };
+    let program = takt_ir::parse_program(&case.source, &known).map_err(|e| format!("{}:{}: {}", e.line, e.column, e.message))?;
+    match (takt_ir::verify(&program), &wave.refused) {
+        (Ok(()), None) => both(program, &wave),
+        (Ok(()), Some(reason)) => Err(format!("the verifier lets it pass; expected it to be refused: {reason}")),
+        (Err(e), Some(reason)) if e.to_string().contains(reason.as_str()) => Ok(()),
+        (Err(e), _) => Err(format!("the verifier refuses it: {e}")),
+    }
+}
+
+/// Plays the waveform in both executors and compares them.
+fn both(program: Program, wave: &Waveform) -> Result<(), String> {
     let program = Arc::new(program);
-    let interpreted = play(&program, &wave, ExecutorKind::Interpreter).map_err(|e| format!("interpreter: {e}"))?;
-    let compiled = play(&program, &wave, ExecutorKind::Jit).map_err(|e| format!("machine code: {e}"))?;
+    let interpreted = play(&program, wave, ExecutorKind::Interpreter).map_err(|e| format!("interpreter: {e}"))?;
+    let compiled = play(&program, wave, ExecutorKind::Jit).map_err(|e| format!("machine code: {e}"))?;
     compare(&interpreted, &compiled)
 }
 

@@ -3,13 +3,15 @@
 //! `--- name check ---`: every line `// ^ CODE text` says that the line above it has a message with that code at the caret's column, whose text
 //! contains `text` (`// <- CODE text`: at column 1); there must be no other message. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
 //! expects (`_` does not), `every 10ms` is the step, `fault NAME at LINE:COL` expects the run to end so, `stack BODY:LINE …` its callers.
+//! `--- name ir ---`: a program in the text form of the IR, for what ST cannot reach; the waveform stands behind `;|`, and `refused TEXT` says that the
+//! verifier must not let it pass.
 
 /// A case.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The fact it states.
     pub name: String,
-    /// `check` or `run`.
+    /// `check`, `run` or `ir`.
     pub kind: String,
     /// The program (comments of the bench included: they are comments in ST too).
     pub source: String,
@@ -88,18 +90,22 @@ pub struct Waveform {
     pub fault: Option<String>,
     /// `main:7 outer:3`.
     pub stack: Option<String>,
+    /// Part of the verifier's message.
+    pub refused: Option<String>,
 }
 
 /// Reads the `//|` lines.
 pub fn waveform(source: &str) -> Result<Waveform, String> {
     let mut wave = Waveform { every: 10_000_000, ..Waveform::default() };
-    for line in source.lines().filter_map(|l| l.trim().strip_prefix("//|")) {
+    for line in source.lines().filter_map(|l| l.trim().strip_prefix("//|").or_else(|| l.trim().strip_prefix(";|"))) {
         let line = line.trim();
         if let Some(step) = line.strip_prefix("every ") {
             let ms: f64 = step.trim().strip_suffix("ms").and_then(|n| n.parse().ok()).ok_or(format!("`{step}` is not a time in ms"))?;
             wave.every = (ms * 1e6) as i64;
         } else if let Some(fault) = line.strip_prefix("fault ") {
             wave.fault = Some(fault.trim().into());
+        } else if let Some(reason) = line.strip_prefix("refused ") {
+            wave.refused = Some(reason.trim().into());
         } else if let Some(stack) = line.strip_prefix("stack ") {
             wave.stack = Some(stack.trim().into());
         } else {
