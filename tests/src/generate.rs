@@ -1,7 +1,7 @@
 //! Random ST programs: the same seed is the same program, on every machine.
 //!
 //! Each program has types, global variables, functions (one calls itself, one takes `ARRAY[*]`), blocks within blocks, and a main program. It compiles
-//! without errors. A *tame* program guards its indices, divisors, pointers and loops, so that it runs its scans to their end; a *wild* one (each fourth)
+//! without errors. A *tame* program guards its indices, divisors, pointers and loops, so that it runs its scans to their end; a *wild* one (three of ten)
 //! forges indices and pointers, divides by what may be 0, calls itself without end and loops without end.
 //!
 //! **What is absent:** tasks and configurations, files, motion and G-code blocks; they have tests of their own.
@@ -31,7 +31,7 @@ pub struct Generated {
 pub fn generate(seed: u64) -> Generated {
     let mut random = Random::new(seed);
     let iec_arithmetic = random.chance(12);
-    let wild = random.chance(25);
+    let wild = random.chance(30);
     let mut generator = Generator { random, wild, ..Generator::default() };
     generator.program();
     Generated { seed, source: generator.text, iec_arithmetic }
@@ -129,7 +129,8 @@ impl Generator {
 
     fn enumeration(&mut self, i: usize) {
         let members: Vec<String> = (0..2 + self.random.below(4)).map(|m| format!("e{i}_{m}")).collect();
-        let list: Vec<String> = members.iter().enumerate().map(|(m, name)| if m == 1 { format!("{name} := {}", 5 + i) } else { name.clone() }).collect();
+        let list: Vec<String> =
+            members.iter().enumerate().map(|(m, name)| if m == 1 { format!("{name} := {}", 5 + i) } else { name.clone() }).collect();
         let base = self.random.pick(&["", "", " USINT", " DINT", " LINT"]);
         self.line(&format!("  en{i} : ({}){base};", list.join(", ")));
         self.enumerations.push(Enumeration { name: format!("en{i}"), members });
@@ -143,7 +144,9 @@ impl Generator {
         let mut fields = Vec::new();
         for f in 0..1 + self.random.below(5) {
             let shape = match (union, self.data(1)) {
-                (true, shape) if matches!(shape, Shape::Text(_) | Shape::Wide(_) | Shape::Enumeration(_) | Shape::Range(_)) => self.elementary(),
+                (true, shape) if matches!(shape, Shape::Text(_) | Shape::Wide(_) | Shape::Enumeration(_) | Shape::Range(_)) => {
+                    self.elementary()
+                }
                 (_, shape) => shape,
             };
             self.line(&format!("    m{f} : {};", self.spell(&shape)));

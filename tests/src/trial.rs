@@ -3,6 +3,7 @@
 //! All that can be seen of a run is in its [`Outcome`], fuel and polls included, which an engine keeps for itself. Initial values are set by the
 //! interpreter in every run, so that a run with a mistake starts where the right one does.
 
+use crate::generate::Random;
 use std::cell::RefCell;
 use std::sync::atomic::AtomicU32;
 use takt_abi::{Context, Env, Fault, NoHost, Resources, TRACE_DEPTH, Time};
@@ -22,6 +23,21 @@ pub struct Start {
     pub flag: u32,
     /// Depth of calls.
     pub depth_limit: u32,
+    /// Bytes of the stack region that may be used, if it has so many.
+    pub stack: u32,
+}
+
+impl Start {
+    /// One of many ways to start, the same for the same seed: much fuel or little, every poll slow, a low limit of depth, a small stack.
+    pub fn of(seed: u64) -> Self {
+        let mut random = Random::new(seed ^ 0x5EED);
+        let fuel = random.pick(&[5000, 5000, 5000, 300, 40, 7]);
+        let slow_polls = random.below(4) as u32 * random.below(60) as u32;
+        let flag = u32::from(random.chance(10));
+        let depth_limit = random.pick(&[60, 60, 60, 60, 6, 3, 1]);
+        let stack = random.pick(&[1 << 20, 1 << 20, 1 << 20, 1 << 20, 1 << 20, 4096, 1024, 320]);
+        Self { scans: 2, fuel, slow_polls, flag, depth_limit, stack }
+    }
 }
 
 /// All that can be seen of a run.
@@ -104,7 +120,7 @@ fn run(program: &Program, start: Start, mut executor: impl FnMut(BodyId, u64, &m
         depth_limit: start.depth_limit,
         image: image.as_mut_ptr(),
         image_size: program.image_size.into(),
-        stack_end: u64::from(frame) + u64::from(size),
+        stack_end: u64::from(frame) + u64::from(size.min(start.stack)),
         poll,
         trace: [0; TRACE_DEPTH],
         env: &raw mut env,

@@ -14,7 +14,7 @@ use takt_tests::shrink::shrink;
 use takt_tests::trial::{Start, compiled, interpreted};
 
 /// Programs that are also run without an engine, marked, for the table: one of so many.
-const MARKED: u64 = 4;
+const MARKED: u64 = 2;
 
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
@@ -25,13 +25,17 @@ fn count(program: &Arc<Program>, seed: u64, table: &mut Table) -> Result<(), Fin
     let marked = marked(program);
     takt_ir::verify(&marked.program).map_err(|e| Finding::Unsound(format!("with marks: {e}")))?;
     let code = takt_jit::compile(&marked.program).map_err(|e| Finding::Unsound(format!("with marks: {e}")))?;
-    let start = Start { scans: 2, fuel: 5000, slow_polls: (seed % 5) as u32, flag: u32::from(seed % 16 == 0), depth_limit: 60 };
+    let start = Start::of(seed);
     let (a, b) = (interpreted(&marked.program, start), compiled(&marked.program, &code, start));
     table.run(&marked, &a.image, 0);
     table.run(&marked, &b.image, 1);
     table.fault(a.fault, 0);
     table.fault(b.fault, 1);
-    if a == b { Ok(()) } else { Err(Finding::Differs(format!("with marks: {:?} and {:?}", (a.fault, a.site, a.fuel, a.polls), (b.fault, b.site, b.fuel, b.polls)))) }
+    if a == b {
+        Ok(())
+    } else {
+        Err(Finding::Differs(format!("with marks: {:?} and {:?}", (a.fault, a.site, a.fuel, a.polls), (b.fault, b.site, b.fuel, b.polls))))
+    }
 }
 
 fn test(generated: &Generated, table: &mut Table) -> Result<Option<Fault>, Finding> {
@@ -79,7 +83,8 @@ fn random_programs_run_alike_and_reach_everything() {
         println!("{}", generate(first).source);
     }
     println!("{table}");
-    let shown: Vec<String> = found.iter().map(|(g, f)| format!("seed {}{}: {f}\n{}", g.seed, if g.iec_arithmetic { " (iec)" } else { "" }, g.source)).collect();
+    let shown: Vec<String> =
+        found.iter().map(|(g, f)| format!("seed {}{}: {f}\n{}", g.seed, if g.iec_arithmetic { " (iec)" } else { "" }, g.source)).collect();
     assert!(shown.is_empty(), "{}", shown.join("\n"));
     if end - first >= 2000 {
         assert_eq!(table.missing(), Vec::<String>::new(), "never reached");

@@ -154,7 +154,7 @@ impl Generator {
 
     /// A pointer to this type; in a wild program it may be forged.
     pub(super) fn pointer(&mut self, to: &Shape) -> String {
-        let forged = self.wild && self.random.chance(20);
+        let forged = self.wild && self.random.chance(35);
         let target = self.reach(&|s| s == to, true);
         match target {
             _ if forged => {
@@ -169,9 +169,10 @@ impl Generator {
 
     /// An integer expression; its type is left to chance.
     pub(super) fn int(&mut self, depth: usize) -> String {
-        let s = named(self.random.pick(&[
-            "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD", "INT", "DINT",
-        ]));
+        let s =
+            named(self.random.pick(&[
+                "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD", "INT", "DINT",
+            ]));
         let place = match self.random.below(4) {
             0 => self.place(s).map(|p| (p, s)),
             _ => self.place_of(Class::Int),
@@ -292,7 +293,11 @@ impl Generator {
         let (a, s) = self.place_of(Class::Duration)?;
         let zero = if s.bits == 32 { "T#0ms" } else { "LTIME#0ns" };
         let b = self.place(s)?;
-        Some(if self.wild { format!("({a} / {b})") } else { format!("({a} / SEL({b} = {zero}, {b}, {}3{}))", &zero[..zero.len() - 3], &zero[zero.len() - 2..]) })
+        Some(if self.wild {
+            format!("({a} / {b})")
+        } else {
+            format!("({a} / SEL({b} = {zero}, {b}, {}3{}))", &zero[..zero.len() - 3], &zero[zero.len() - 2..])
+        })
     }
 
     /// An expression of REAL or LREAL.
@@ -312,7 +317,13 @@ impl Generator {
             13 => format!("ABS({})", self.real(s, d)),
             14 => format!("{}({path}, {})", self.random.pick(&["MIN", "MAX"]), self.real(s, d)),
             15 => format!("SEL({}, {path}, {})", self.boolean(d), self.real(s, d)),
+            16 if self.random.chance(40) => format!("STRING_TO_{}({})", s.name, self.text(d)),
             16 => self.conversion(s, d),
+            17 if self.random.chance(50) => {
+                let word = named(self.random.pick(&["ULINT", "LWORD"]));
+                let place = self.place(word).filter(|_| self.random.chance(50));
+                format!("TO_{}({})", s.name, place.unwrap_or_else(|| self.int(d)))
+            }
             17 => format!("({path} {} {})", self.random.pick(&["+", "-", "*", "/"]), self.int(d)),
             18 => format!("LIMIT({}, {path}, {})", self.real(s, 0), self.real(s, 0)),
             _ => path,
@@ -347,7 +358,11 @@ impl Generator {
     fn comparison(&mut self, d: usize) -> String {
         let sign = self.random.below(6);
         let (a, b) = self.two(d);
-        if self.random.chance(15) { format!("{}({a}, {b})", COMPARISON_FUNCTIONS[sign]) } else { format!("({a} {} {b})", COMPARISONS[sign]) }
+        if self.random.chance(15) {
+            format!("{}({a}, {b})", COMPARISON_FUNCTIONS[sign])
+        } else {
+            format!("({a} {} {b})", COMPARISONS[sign])
+        }
     }
 
     /// Two values that can be compared.

@@ -210,8 +210,11 @@ impl Generator {
 
     /// An elementary type, the common ones more often.
     pub(super) fn elementary(&mut self) -> Shape {
-        let common = self.random.chance(50);
-        Shape::Scalar(&SCALARS[self.random.below(if common { 15 } else { SCALARS.len() })])
+        match self.random.below(10) {
+            0..=3 => Shape::Scalar(&SCALARS[self.random.below(15)]),
+            4 | 5 => Shape::Scalar(named(self.random.pick(&["REAL", "LREAL"]))),
+            _ => Shape::Scalar(&SCALARS[self.random.below(SCALARS.len())]),
+        }
     }
 
     /// A type that one assignment fills.

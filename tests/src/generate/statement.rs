@@ -38,6 +38,7 @@ impl Generator {
                 self.line(&format!("IF {cond} THEN RETURN; END_IF"));
             }
             26 => self.open_array_call(),
+            27 | 28 if self.wild => self.pointer_statement(0),
             _ => self.assignment(),
         }
     }
@@ -187,6 +188,16 @@ impl Generator {
             let value = self.value(to, 1);
             self.line(&format!("  {path}^ := {value};"));
         }
+        if self.wild
+            && !to.is_leaf()
+            && self.random.chance(50)
+            && let Some((whole, _)) = self.reach(&|s| s == &**to, true)
+        {
+            // A copy onto itself, some bytes further.
+            let further = 1 + self.random.below(9);
+            self.line(&format!("  {path} := ADR({whole}) + {further};"));
+            self.line(&format!("  {path}^ := {whole};"));
+        }
         if self.wild && self.random.chance(30) && to.is_leaf() {
             let (index, value) = (self.int(0), self.value(to, 0));
             self.line(&format!("  {path}[{index}] := {value};"));
@@ -202,8 +213,14 @@ impl Generator {
         let Some((to, shape)) = self.reach(&large, true) else { return self.assignment() };
         let result = self.function_call(&shape, 1).filter(|_| self.random.chance(40));
         let from = result.or_else(|| self.reach(&|s| *s == shape, false).map(|(path, _)| path));
-        if let Some(from) = from {
-            self.line(&format!("{to} := {from};"));
+        let Some(from) = from else { return };
+        let choice = matches!(shape, Shape::Structure(_)) && self.random.chance(20);
+        match self.reach(&|s| *s == shape, false).filter(|_| choice) {
+            Some((other, _)) => {
+                let cond = self.boolean(1);
+                self.line(&format!("{to} := SEL({cond}, {from}, {other});"));
+            }
+            None => self.line(&format!("{to} := {from};")),
         }
     }
 
@@ -328,7 +345,7 @@ impl Generator {
         if function.recursive
             && let Some(first) = arguments.first_mut()
         {
-            let deep = self.wild && self.random.chance(15);
+            let deep = self.wild && self.random.chance(30);
             let level = if deep { "30000".into() } else { self.random.below(6).to_string() };
             *first = format!("level := {level}");
         }
@@ -345,7 +362,8 @@ impl Generator {
             _ => None,
         });
         let Some((function, parameter, elem)) = open else { return self.assignment() };
-        let fits = |s: &Shape| matches!(s, Shape::Array(e, dims) if **e == elem && dims.len() == 1) || *s == Shape::Open(Box::new(elem.clone()));
+        let fits =
+            |s: &Shape| matches!(s, Shape::Array(e, dims) if **e == elem && dims.len() == 1) || *s == Shape::Open(Box::new(elem.clone()));
         let (array, target) = (self.reach(&fits, true), self.reach(&|s| s.is(Class::Int), true));
         let k = self.int(1);
         if let (Some((array, _)), Some((target, _))) = (array, target) {

@@ -13,7 +13,14 @@ pub fn standard_blocks() -> Vec<Signature> {
         ("F_TRIG", &[("CLK", "BOOL")], &[("Q", "BOOL")]),
     ];
     let list = |names: &[(&str, &str)]| names.iter().map(|(n, t)| (n.to_string(), Shape::Scalar(named(t)))).collect::<Vec<_>>();
-    all.iter().map(|(name, inputs, outputs)| Signature { name: name.to_string(), inputs: list(inputs), outputs: list(outputs), ..Signature::default() }).collect()
+    all.iter()
+        .map(|(name, inputs, outputs)| Signature {
+            name: name.to_string(),
+            inputs: list(inputs),
+            outputs: list(outputs),
+            ..Signature::default()
+        })
+        .collect()
 }
 
 impl Generator {
@@ -35,7 +42,14 @@ impl Generator {
     }
 
     fn variables(&mut self, prefix: &str, count: usize) -> Vec<Variable> {
-        (0..count).map(|i| Variable::new(format!("{prefix}{i}"), self.data(2))).collect()
+        (0..count).map(|i| Variable::new(format!("{prefix}{i}"), self.data_or_seen())).collect()
+    }
+
+    /// Any type of data, often one that is there already, so that there is something to copy, pass and point to.
+    fn data_or_seen(&mut self) -> Shape {
+        let data = |s: &Shape| matches!(s, Shape::Structure(_) | Shape::Array(..));
+        let seen = if self.random.chance(35) { self.reach(&data, false) } else { None };
+        seen.map_or_else(|| self.data(2), |(_, shape)| shape)
     }
 
     fn leaves(&mut self, prefix: &str, count: usize) -> Vec<Variable> {
@@ -45,24 +59,46 @@ impl Generator {
     /// Variables of the unit itself: data, pointers, references, counters.
     fn locals(&mut self, section: &str, count: usize) -> Vec<Variable> {
         let mut locals = self.variables("v", count);
-        for i in 0..self.random.below(3) {
-            let to = self.target();
+        let mark = self.scope.len();
+        self.scope.extend(locals.clone());
+        let targets: Vec<Shape> = (0..self.random.below(3)).map(|_| self.target()).collect();
+        self.scope.truncate(mark);
+        for (i, to) in targets.into_iter().enumerate() {
             locals.push(Variable::new(format!("p{i}"), Shape::Pointer(Box::new(to))));
         }
         self.declare(section, &locals);
         locals
     }
 
+    /// Elementary variables, so that operators find operands of many types.
+    fn elementaries(&mut self, section: &str, count: usize) {
+        let all: Vec<Variable> = (0..count).map(|i| Variable::new(format!("n{i}"), self.elementary())).collect();
+        self.declare(section, &all);
+        self.scope.extend(all);
+    }
+
+    /// A pointer to a local variable of a function, which therefore lies in memory.
+    fn pointer_to_local(&mut self) -> Option<String> {
+        let local = self.scope.iter().find(|v| v.path == "n0")?.clone();
+        let pointer = Shape::Pointer(Box::new(local.shape.clone()));
+        self.line("VAR");
+        self.line(&format!("  q : {};", self.spell(&pointer)));
+        self.line("END_VAR");
+        self.scope.push(Variable::new("q^", local.shape));
+        Some("q := ADR(n0);".into())
+    }
+
     /// A type that some variable here has, so that a pointer to it finds a target.
     fn target(&mut self) -> Shape {
-        let data = |s: &Shape| s.is_leaf() && !matches!(s, Shape::Pointer(_)) || matches!(s, Shape::Structure(_));
+        let data = |s: &Shape| s.is_leaf() && !matches!(s, Shape::Pointer(_)) || matches!(s, Shape::Structure(_) | Shape::Array(..));
         self.reach(&data, true).map_or(Shape::Scalar(named("INT")), |(_, s)| s)
     }
 
     fn declare_counters(&mut self, section: &str) {
         let kinds = ["DINT", "INT", "SINT", "LINT", "UINT", "DINT"];
-        let counters: Vec<Variable> =
-            (0..3).map(|i| Variable::fixed(format!("c{i}"), Shape::Scalar(named(kinds[self.random.below(if i == 0 { 6 } else { 4 })])))).collect();
+        let counters: Vec<Variable> = (0..3)
+            .map(|i| Variable::fixed(format!("c{i}"), Shape::Scalar(named(kinds[self.random.below(if i == 0 { 6 } else { 4 })]))))
+            .collect();
         self.line(section);
         for counter in &counters {
             self.line(&format!("  {} : {};", counter.path, self.spell(&counter.shape)));
@@ -115,9 +151,18 @@ impl Generator {
             1 => Shape::Text(20),
             _ => self.elementary(),
         };
-        let inputs = { let n = 1 + self.random.below(3); self.leaves("i", n) };
-        let in_outs = { let n = self.random.below(2); self.variables("x", n) };
-        let outputs = { let n = self.random.below(3); self.leaves("o", n) };
+        let inputs = {
+            let n = 1 + self.random.below(3);
+            self.leaves("i", n)
+        };
+        let in_outs = {
+            let n = self.random.below(2);
+            self.variables("x", n)
+        };
+        let outputs = {
+            let n = self.random.below(3);
+            self.leaves("o", n)
+        };
         self.line(&format!("FUNCTION {name} : {}", self.spell(&result)));
         self.declare("VAR_INPUT", &inputs);
         self.declare("VAR_IN_OUT", &in_outs);
@@ -126,17 +171,27 @@ impl Generator {
         let count = self.random.below(4);
         let locals = self.locals("VAR", count);
         self.scope.extend(locals);
+        self.elementaries("VAR", 4);
         self.declare_counters("VAR");
-        let bound = self.references("VAR");
+        let mut bound = self.references("VAR");
+        let pointer = if self.random.chance(60) { self.pointer_to_local() } else { None };
         self.scope.push(Variable::new(name, result.clone()));
-        self.body_of_unit(&bound, 8);
+        bound.extend(pointer);
+        self.body_of_unit(&bound, 10);
         if result.is_leaf() {
             let value = self.value(&result, 2);
             self.line(&format!("  {name} := {value};"));
         }
         self.line("END_FUNCTION");
         let list = |all: Vec<Variable>| all.into_iter().map(|v| (v.path, v.shape)).collect();
-        let signature = Signature { name: name.into(), inputs: list(inputs), in_outs: list(in_outs), outputs: list(outputs), result: Some(result), ..Signature::default() };
+        let signature = Signature {
+            name: name.into(),
+            inputs: list(inputs),
+            in_outs: list(in_outs),
+            outputs: list(outputs),
+            result: Some(result),
+            ..Signature::default()
+        };
         self.functions.push(signature);
     }
 
@@ -164,7 +219,13 @@ impl Generator {
         self.line("END_FUNCTION");
         let mut all = vec![("level".to_string(), Shape::Scalar(named("INT")))];
         all.extend(inputs.into_iter().map(|v| (v.path, v.shape)));
-        self.functions.push(Signature { name: "down".into(), inputs: all, result: Some(Shape::Scalar(s)), recursive: true, ..Signature::default() });
+        self.functions.push(Signature {
+            name: "down".into(),
+            inputs: all,
+            result: Some(Shape::Scalar(s)),
+            recursive: true,
+            ..Signature::default()
+        });
     }
 
     /// A function over an array of any length.
@@ -205,9 +266,18 @@ impl Generator {
     /// A block, which may hold instances of those before it.
     pub(super) fn block(&mut self, name: &str) {
         self.open_scope();
-        let inputs = { let n = 1 + self.random.below(3); self.variables("i", n) };
-        let outputs = { let n = 1 + self.random.below(2); self.variables("o", n) };
-        let in_outs = { let n = self.random.below(2); self.leaves("x", n) };
+        let inputs = {
+            let n = 1 + self.random.below(3);
+            self.variables("i", n)
+        };
+        let outputs = {
+            let n = 1 + self.random.below(2);
+            self.variables("o", n)
+        };
+        let in_outs = {
+            let n = self.random.below(2);
+            self.leaves("x", n)
+        };
         self.line(&format!("FUNCTION_BLOCK {name}"));
         self.declare("VAR_INPUT", &inputs);
         self.declare("VAR_OUTPUT", &outputs);
@@ -220,6 +290,7 @@ impl Generator {
         let instances = self.instances(2);
         self.declare("VAR", &instances);
         self.scope.extend(instances);
+        self.elementaries("VAR", 5);
         self.declare_counters("VAR_TEMP");
         let outside = self.scope.clone();
         let bound = self.references("VAR_TEMP");
@@ -238,7 +309,14 @@ impl Generator {
         }
         self.line("END_FUNCTION_BLOCK");
         let list = |all: Vec<Variable>| all.into_iter().map(|v| (v.path, v.shape)).collect();
-        self.blocks.push(Signature { name: name.into(), inputs: list(inputs), in_outs: list(in_outs), outputs: list(outputs), action, ..Signature::default() });
+        self.blocks.push(Signature {
+            name: name.into(),
+            inputs: list(inputs),
+            in_outs: list(in_outs),
+            outputs: list(outputs),
+            action,
+            ..Signature::default()
+        });
     }
 
     /// Instances of blocks, some in arrays.
@@ -264,9 +342,10 @@ impl Generator {
         let instances = self.instances(4);
         self.declare("VAR", &instances);
         self.scope.extend(instances);
+        self.elementaries("VAR", 14);
         self.declare_counters("VAR");
         let bound = self.references("VAR");
-        self.body_of_unit(&bound, 24);
+        self.body_of_unit(&bound, 40);
         self.line("END_PROGRAM");
     }
 }
