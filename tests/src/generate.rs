@@ -8,6 +8,7 @@
 
 mod expression;
 mod literal;
+mod place;
 mod random;
 mod shape;
 mod statement;
@@ -144,9 +145,7 @@ impl Generator {
         let mut fields = Vec::new();
         for f in 0..1 + self.random.below(5) {
             let shape = match (union, self.data(1)) {
-                (true, shape) if matches!(shape, Shape::Text(_) | Shape::Wide(_) | Shape::Enumeration(_) | Shape::Range(_)) => {
-                    self.elementary()
-                }
+                (true, Shape::Text(_) | Shape::Wide(_) | Shape::Enumeration(_) | Shape::Range(_)) => self.elementary(),
                 (_, shape) => shape,
             };
             self.line(&format!("    m{f} : {};", self.spell(&shape)));

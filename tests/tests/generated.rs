@@ -40,7 +40,7 @@ fn count(program: &Arc<Program>, seed: u64, table: &mut Table) -> Result<(), Fin
 
 fn test(generated: &Generated, table: &mut Table) -> Result<Option<Fault>, Finding> {
     let (program, fault) = examine(generated)?;
-    if generated.seed % MARKED == 0 {
+    if generated.seed.is_multiple_of(MARKED) {
         count(&program, generated.seed, table)?;
     }
     Ok(fault)

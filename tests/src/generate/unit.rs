@@ -5,7 +5,8 @@ use super::shape::{Class, Shape, Signature, Variable, named};
 
 /// Blocks of the library, as a caller sees them.
 pub fn standard_blocks() -> Vec<Signature> {
-    let all: &[(&str, &[(&str, &str)], &[(&str, &str)])] = &[
+    type Fields = &'static [(&'static str, &'static str)];
+    let all: &[(&str, Fields, Fields)] = &[
         ("TON", &[("IN", "BOOL"), ("PT", "TIME")], &[("Q", "BOOL"), ("ET", "TIME")]),
         ("TOF", &[("IN", "BOOL"), ("PT", "TIME")], &[("Q", "BOOL"), ("ET", "TIME")]),
         ("TP", &[("IN", "BOOL"), ("PT", "TIME")], &[("Q", "BOOL"), ("ET", "TIME")]),
