@@ -71,6 +71,14 @@ pub(crate) struct Core {
 }
 
 impl Core {
+    /// Bytes of native stack that a step can use at the most: every task may be interrupted by the next higher one.
+    pub fn native_stack(&self) -> usize {
+        match &self.executor {
+            Executor::Interpreter => takt_jit::NATIVE_STACK * (self.tasks.len() + 1),
+            Executor::Jit(code) => code.native_stack_bound(self.depth_limit) * self.tasks.len() + takt_jit::NATIVE_STACK,
+        }
+    }
+
     /// Runs what is due at `now`.
     pub fn step(&mut self, now: Time) {
         self.now = now;

@@ -101,13 +101,9 @@ impl Engine {
         &self.core.program
     }
 
-    /// Bytes of native stack that a step can use at the most: the thread that calls [`Engine::step`] must have them.
+    /// Bytes of native stack that a step can use at the most; [`crate::load`] has held it to [`crate::Options::native_stack`].
     pub fn native_stack(&self) -> usize {
-        let core = &self.core;
-        match &core.executor {
-            Executor::Interpreter => 2 * takt_jit::NATIVE_STACK * core.tasks.len(),
-            Executor::Jit(code) => code.native_stack_bound(core.depth_limit) * core.tasks.len() + takt_jit::NATIVE_STACK,
-        }
+        self.core.native_stack()
     }
 
     /// Index of the task that owns the bus.

@@ -38,6 +38,13 @@ pub enum LoadError {
         /// Bytes asked for.
         size: u32,
     },
+    /// The deepest calls of the program may need more native stack than the thread has.
+    NativeStack {
+        /// Bytes needed at the most.
+        needed: usize,
+        /// Bytes given ([`Options::native_stack`]).
+        given: usize,
+    },
     /// An axis is configured wrongly.
     Axis {
         /// Path of its variable.
@@ -104,6 +111,12 @@ impl std::fmt::Display for LoadError {
             Self::NoTask => write!(f, "the program has no task"),
             Self::BusTask { name, known } => write!(f, "there is no task `{name}`; there are: {}", known.join(", ")),
             Self::Memory { size } => write!(f, "no memory for an image of {size} bytes"),
+            Self::NativeStack { needed, given } => write!(
+                f,
+                "the deepest calls of the program may need {} MiB of stack and there are {} MiB: make the functions that call themselves smaller, or move their large variables out of them",
+                needed >> 20,
+                given >> 20
+            ),
             Self::Axis { name, problem } => write!(f, "axis `{name}`: {problem}"),
             Self::Wire { name, problem } => write!(f, "wire `{name}`: {problem}"),
             Self::Initial(record) => write!(f, "the initial values ended in a fault: {record}"),
@@ -174,6 +187,10 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         scan_started: Time(0),
         program,
     });
+    let needed = core.native_stack();
+    if needed > options.native_stack {
+        return Err(LoadError::NativeStack { needed, given: options.native_stack });
+    }
     core.initialise().map_err(LoadError::Initial)?;
     Ok(Engine::new(core))
 }

@@ -51,6 +51,8 @@ pub struct Options {
     pub fuel_limit: u64,
     /// Depth of calls in recursive cycles before it is a [`takt_abi::Fault::StackOverflow`].
     pub depth_limit: u32,
+    /// Bytes of native stack that the thread which loads and steps the engine has for it. A program that may need more is refused.
+    pub native_stack: usize,
     /// Virtual or real.
     pub clock: Clock,
     /// Time one scan may take under [`Clock::Real`] before it is a [`takt_abi::Fault::Watchdog`]. 0: no limit but fuel.
@@ -71,6 +73,7 @@ impl Default for Options {
             wires: Vec::new(),
             fuel_limit: 20_000_000,
             depth_limit: 1000,
+            native_stack: 7 << 18, // of the 2 MiB that a thread has by default
             clock: Clock::Virtual,
             watchdog: Time(0),
             preempt: Vec::new(),

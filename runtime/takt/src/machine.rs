@@ -23,6 +23,9 @@ use takt_abi::Time;
 use takt_engine::{Clock, Engine, ExecutorKind, FaultRecord, LoadError};
 use takt_ir::{BodyId, Place, Program, Trigger};
 
+/// Bytes of native stack that the tool's thread keeps for compiled code.
+pub const NATIVE_STACK: usize = 240 << 20;
+
 /// How a machine is to be run.
 #[derive(Debug, Clone, Default)]
 pub struct Setup {
@@ -34,6 +37,8 @@ pub struct Setup {
     pub stopwatch: Option<fn() -> u64>,
     /// An ST condition that ends the run.
     pub until: Option<String>,
+    /// Bytes of native stack that the calling thread keeps for compiled code. `None`: what an ordinary thread has.
+    pub native_stack: Option<usize>,
 }
 
 /// A condition with its text.
@@ -79,15 +84,17 @@ impl Machine {
             .map_err(|error| BuildError::Manifest(project.errors(vec![error])))?;
         let bound = binding::bind(project, &program, &bus.channels).map_err(BuildError::Manifest)?;
         let operator = Operator::new(bound.steps, waits.into_iter().map(watch).collect());
+        let ordinary = takt_engine::Options::default();
         let options = takt_engine::Options {
             executor: setup.executor,
+            native_stack: setup.native_stack.unwrap_or(ordinary.native_stack),
             bus_task: project.manifest.bus_task.as_ref().map(|task| task.value.clone()),
             host: Box::new(host::open(project.root.clone()).map_err(BuildError::Files)?),
             axes: bound.axes,
             wires: bound.wires,
             clock: setup.clock,
             stopwatch: setup.stopwatch,
-            ..takt_engine::Options::default()
+            ..ordinary
         };
         let (driver, bus) = bus.split();
         let engine = takt_engine::load(program.clone(), options, driver).map_err(|error| load_error(project, error))?;

@@ -75,7 +75,13 @@ fn build(args: &RunArgs, project: &Project, speed: Speed) -> Result<Machine, Exi
         EngineKind::Interp => ExecutorKind::Interpreter,
     };
     let clock = if speed == Speed::Factor(1.0) { Clock::Real(clock::machine_time) } else { Clock::Virtual };
-    let setup = Setup { executor, clock, stopwatch: Some(clock::nanoseconds), until: args.until.clone() };
+    let setup = Setup {
+        executor,
+        clock,
+        stopwatch: Some(clock::nanoseconds),
+        until: args.until.clone(),
+        native_stack: Some(crate::machine::NATIVE_STACK),
+    };
     let machine = Machine::new(project, setup).map_err(|error| refuse(&error))?;
     check::tell(machine.compiled());
     Ok(machine)
