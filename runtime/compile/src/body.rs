@@ -1,6 +1,7 @@
 //! Bodies: parameters, local variables, statements.
 
 use crate::expression::{Kind, Lowering};
+use crate::initial::Target;
 use crate::place::{Place, mem};
 use crate::scope::{Storage, Variable, key};
 use crate::unit::{Compiler, Job};
@@ -262,7 +263,7 @@ impl<'a> Lowering<'_, 'a> {
         }
         let mut bytes = vec![0; self.c.types.size(v.ty) as usize];
         let mut late = Vec::new();
-        self.c.fill(v.decl, v.ty, pou, &mut bytes, 0, &mut late);
+        self.c.fill(v.decl, v.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
         let operand = self.stored(storage, v.ty, v.span);
         let Kind::Place(Place::Memory { base, offset }) = operand.kind else { return };
         let data = self.pool(&bytes);

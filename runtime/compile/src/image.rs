@@ -1,6 +1,6 @@
 //! The image: where globals, programs, statics and stacks lie, and its first bytes.
 
-use crate::initial::Late;
+use crate::initial::{Late, Target};
 use crate::scope::{Storage, key};
 use crate::unit::Compiler;
 use takt_abi::Section;
@@ -73,7 +73,7 @@ impl<'a> Compiler<'a> {
         let size = self.types.size(var.ty) as usize;
         let mut bytes = vec![0; size];
         let mut late = Vec::new();
-        self.fill(var.decl, var.ty, pou, &mut bytes, 0, &mut late);
+        self.fill(var.decl, var.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
         self.write(offset, &bytes);
         self.late.extend(late.into_iter().map(|(at, ty, expr)| Late { offset: offset + at, ty, expr, pou }));
     }

@@ -18,6 +18,21 @@ pub(crate) struct Late<'a> {
     pub(crate) pou: Option<usize>,
 }
 
+/// Initial bytes being written, and what cannot be bytes: offset, type, expression.
+pub(crate) struct Target<'a, 'b> {
+    /// The unit whose names the expressions may use.
+    pub(crate) pou: Option<usize>,
+    pub(crate) bytes: &'b mut [u8],
+    pub(crate) late: &'b mut Vec<(u32, TypeId, &'a tree::Expr)>,
+}
+
+/// What is left of an array: the next element's offset, the end, bytes per element.
+struct Room {
+    next: u32,
+    end: u32,
+    size: u32,
+}
+
 /// A constant, something else, or an error that has been reported.
 pub(crate) enum Known {
     Value(Value),
@@ -97,24 +112,16 @@ impl<'a> Compiler<'a> {
     }
 
     /// Writes a variable's initial value at `at`: its type's, then its own. What is not constant goes to `late`.
-    pub(crate) fn fill(
-        &mut self,
-        decl: &'a tree::VarDecl,
-        ty: TypeId,
-        pou: Option<usize>,
-        bytes: &mut [u8],
-        at: u32,
-        late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
-    ) {
+    pub(crate) fn fill(&mut self, decl: &'a tree::VarDecl, ty: TypeId, at: u32, target: &mut Target<'a, '_>) {
         if let Some(template) = self.type_bytes(ty) {
-            bytes[at as usize..at as usize + template.len()].copy_from_slice(&template);
+            target.bytes[at as usize..at as usize + template.len()].copy_from_slice(&template);
         }
         let alias = match &decl.ty.kind {
             tree::TypeExprKind::Named(parts) => parts.last().and_then(|n| self.alias_init(&n.text)),
             _ => None,
         };
         if let Some(init) = decl.init.as_ref().or(alias) {
-            self.overlay(init, ty, pou, bytes, at, late, decl.name.span);
+            self.overlay(init, ty, at, target);
         }
     }
 
@@ -127,99 +134,94 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    #[allow(clippy::too_many_arguments, reason = "the walk over an initialiser carries its place")]
-    pub(crate) fn overlay(
-        &mut self,
-        init: &'a Init,
-        ty: TypeId,
-        pou: Option<usize>,
-        bytes: &mut [u8],
-        at: u32,
-        late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
-        span: Span,
-    ) {
+    fn overlay(&mut self, init: &'a Init, ty: TypeId, at: u32, target: &mut Target<'a, '_>) {
         if *self.types.get(ty) == Type::Error {
             return;
         }
         match init {
-            Init::Expr(expr) => match self.known(expr, pou, Some(ty)).0 {
-                Known::Value(value) => self.store_value(&value, ty, &mut bytes[at as usize..]),
-                Known::Dynamic => late.push((at, ty, expr)),
-                Known::Error => {}
-            },
-            Init::Array(items, span) => {
-                let Type::Array { elem, .. } = *self.types.get(ty) else {
-                    let name = self.types.name(ty);
-                    self.report(Code::BadInitializer, *span, format!("expected a value of type `{name}`, found a list"));
-                    return;
-                };
-                let size = self.types.size(elem).max(1);
-                let end = at + self.types.size(ty);
-                let mut next = at;
-                for item in items {
-                    if !self.overlay_item(item, elem, pou, bytes, (&mut next, end, size), late, *span) {
-                        return;
-                    }
-                }
+            Init::Expr(expr) => {
+                self.overlay_expr(expr, ty, at, target);
             }
-            Init::Struct(members, span) => self.overlay_struct(members, ty, pou, bytes, at, late, *span),
+            Init::Array(items, span) => self.overlay_array(items, ty, at, target, *span),
+            Init::Struct(members, span) => self.overlay_struct(members, ty, at, target, *span),
         }
-        let _ = span;
     }
 
-    #[allow(clippy::too_many_arguments, reason = "the walk over an initialiser carries its place")]
-    fn overlay_item(
-        &mut self,
-        item: &'a InitItem,
-        elem: TypeId,
-        pou: Option<usize>,
-        bytes: &mut [u8],
-        (next, end, size): (&mut u32, u32, u32),
-        late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
-        span: Span,
-    ) -> bool {
+    /// False if the expression is wrong.
+    fn overlay_expr(&mut self, expr: &'a tree::Expr, ty: TypeId, at: u32, target: &mut Target<'a, '_>) -> bool {
+        match self.known(expr, target.pou, Some(ty)).0 {
+            Known::Value(value) => self.store_value(&value, ty, &mut target.bytes[at as usize..]),
+            Known::Dynamic => target.late.push((at, ty, expr)),
+            Known::Error => return false,
+        }
+        true
+    }
+
+    fn overlay_array(&mut self, items: &'a [InitItem], ty: TypeId, at: u32, target: &mut Target<'a, '_>, span: Span) {
+        let Type::Array { elem, .. } = *self.types.get(ty) else {
+            let name = self.types.name(ty);
+            self.report(Code::BadInitializer, span, format!("expected a value of type `{name}`, found a list"));
+            return;
+        };
+        let mut room = Room { next: at, end: at + self.types.size(ty), size: self.types.size(elem).max(1) };
+        for item in items {
+            if self.overlay_item(item, elem, &mut room, target, span).is_none() {
+                return;
+            }
+        }
+    }
+
+    /// `None` if the list cannot go on.
+    fn overlay_item(&mut self, item: &'a InitItem, elem: TypeId, room: &mut Room, target: &mut Target<'a, '_>, span: Span) -> Option<()> {
         if let InitItem::One(Init::Expr(expr)) = item
-            && let Some((count, value)) = self.named_repeat(expr, pou)
+            && let Some((count, value)) = self.named_repeat(expr, target.pou)
         {
-            return self.overlay_named_repeat(count, value, elem, pou, bytes, (next, end, size), late, span);
+            let count = self.repetitions(count, 1, room, span)?;
+            for _ in 0..count {
+                if value.is_some_and(|expr| !self.overlay_expr(expr, elem, room.next, target)) {
+                    return None;
+                }
+                room.next += room.size;
+            }
+            return Some(());
         }
         let (count, values) = match item {
             InitItem::One(init) => (1, std::slice::from_ref(init)),
-            InitItem::Repeat(count, values) => match self.constant_int(count, pou) {
-                Some(n) if n >= 0 => (n.min(i128::from(u32::MAX)) as u64, values.as_slice()),
-                Some(n) => {
-                    self.report(Code::BadInitializer, count.span, format!("a repetition counts from 0, found {n}"));
-                    return false;
-                }
-                None => return false,
-            },
+            InitItem::Repeat(count, values) => (self.constant_int(count, target.pou)?, values.as_slice()),
         };
-        let width = values.len().max(1) as u64;
-        if count.saturating_mul(width).saturating_mul(size.into()) > u64::from(end - *next) {
-            let most = (end - *next) / size;
+        let count = self.repetitions(count, values.len(), room, span)?;
+        let start = room.next;
+        for init in values {
+            self.overlay(init, elem, room.next, target);
+            room.next += room.size;
+        }
+        let stride = if values.is_empty() { room.size } else { room.next - start };
+        for i in u32::from(!values.is_empty())..count {
+            if !values.is_empty() {
+                let (from, to) = (start as usize, (start + i * stride) as usize);
+                target.bytes.copy_within(from..from + stride as usize, to);
+            }
+            room.next += stride;
+        }
+        Some(())
+    }
+
+    /// How often a list of `width` values is written, if there is room.
+    fn repetitions(&mut self, count: i128, width: usize, room: &Room, span: Span) -> Option<u32> {
+        let most = (room.end - room.next) / room.size;
+        let needed = count.saturating_mul(width.max(1) as i128);
+        if count < 0 {
+            self.report(Code::BadInitializer, span, format!("a repetition counts from 0, found {count}"));
+        } else if needed > most.into() {
             self.report(
                 Code::BadInitializer,
                 span,
-                format!("the list is longer than the array: there is room for {most} more, found {}", count.saturating_mul(width)),
+                format!("the list is longer than the array: there is room for {most} more, found {needed}"),
             );
-            return false;
+        } else {
+            return Some(count as u32);
         }
-        let Some(_) = values.first() else {
-            *next += count as u32 * size;
-            return true;
-        };
-        let start = *next;
-        for init in values {
-            self.overlay(init, elem, pou, bytes, *next, late, span);
-            *next += size;
-        }
-        let stride = (*next - start) as usize;
-        for i in 1..count as usize {
-            let from = start as usize;
-            bytes.copy_within(from..from + stride, from + i * stride);
-            *next += stride as u32;
-        }
-        true
+        None
     }
 
     /// `N(x)` with a constant N: a repetition that reads like a call.
@@ -234,47 +236,7 @@ impl<'a> Compiler<'a> {
         Some((count, args.first().and_then(|a| a.value.as_ref())))
     }
 
-    #[allow(clippy::too_many_arguments, reason = "the walk over an initialiser carries its place")]
-    fn overlay_named_repeat(
-        &mut self,
-        count: i128,
-        value: Option<&'a tree::Expr>,
-        elem: TypeId,
-        pou: Option<usize>,
-        bytes: &mut [u8],
-        (next, end, size): (&mut u32, u32, u32),
-        late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
-        span: Span,
-    ) -> bool {
-        if count < 0 || count * i128::from(size) > i128::from(end - *next) {
-            let most = (end - *next) / size;
-            self.report(Code::BadInitializer, span, format!("there is room for {most} more elements, found {count}"));
-            return false;
-        }
-        for _ in 0..count {
-            if let Some(expr) = value {
-                match self.known(expr, pou, Some(elem)).0 {
-                    Known::Value(value) => self.store_value(&value, elem, &mut bytes[*next as usize..]),
-                    Known::Dynamic => late.push((*next, elem, expr)),
-                    Known::Error => return false,
-                }
-            }
-            *next += size;
-        }
-        true
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "the walk over an initialiser carries its place")]
-    fn overlay_struct(
-        &mut self,
-        members: &'a [(tree::Name, Init)],
-        ty: TypeId,
-        pou: Option<usize>,
-        bytes: &mut [u8],
-        at: u32,
-        late: &mut Vec<(u32, TypeId, &'a tree::Expr)>,
-        span: Span,
-    ) {
+    fn overlay_struct(&mut self, members: &'a [(tree::Name, Init)], ty: TypeId, at: u32, target: &mut Target<'a, '_>, span: Span) {
         let Type::Struct(structure) = self.types.get(ty).clone() else {
             let name = self.types.name(ty);
             self.report(Code::BadInitializer, span, format!("expected a value of type `{name}`, found a structure"));
@@ -289,7 +251,7 @@ impl<'a> Compiler<'a> {
                 self.report(Code::BadInitializer, name.span, format!("`{}` is a VAR_IN_OUT and gets its variable at each call", name.text));
                 continue;
             }
-            self.overlay(init, field.ty, pou, bytes, at + field.offset, late, name.span);
+            self.overlay(init, field.ty, at + field.offset, target);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Types, variables and layouts, resolved on demand.
 
 use crate::constant::{Value, cut, range};
+use crate::initial::Target;
 use crate::scope::{Item, Progress, Storage, Variable, key};
 use crate::unit::Compiler;
 use std::rc::Rc;
@@ -290,7 +291,7 @@ impl<'a> Compiler<'a> {
         let mut bytes = vec![0; size as usize];
         let mut late = Vec::new();
         for (decl, (offset, ty)) in decls.iter().zip(offsets) {
-            self.fill(decl, ty, None, &mut bytes, offset, &mut late);
+            self.fill(decl, ty, offset, &mut Target { pou: None, bytes: &mut bytes, late: &mut late });
         }
         self.refuse_late(&late);
         if bytes.iter().any(|b| *b != 0) {
@@ -430,7 +431,7 @@ impl<'a> Compiler<'a> {
         let mut bytes = vec![0; size as usize];
         let mut late = Vec::new();
         for (decl, ty, offset) in filled {
-            self.fill(decl, ty, Some(index), &mut bytes, offset, &mut late);
+            self.fill(decl, ty, offset, &mut Target { pou: Some(index), bytes: &mut bytes, late: &mut late });
         }
         if tree.kind == PouKind::Program {
             self.pous[index].late = late;
