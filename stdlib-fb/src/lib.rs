@@ -28,7 +28,15 @@ pub static LIBRARY: Library = Library {
 /// The types that `takt-abi` itself declares, because the engine reads them too.
 const SHARED_STRUCTS: &[&StructDesc] = &[AxisRef::DESC];
 const SHARED_ENUMS: &[&EnumDesc] = &[AxisState::DESC, Direction::DESC, BufferMode::DESC, ControllerMode::DESC, SmcError::DESC];
-const SHARED_ALIASES: &[(&str, &str)] = &[("AXIS_REF", "AXIS_REF_SM3"), ("SMC_VIRTUAL_AXIS", "AXIS_REF_SM3")];
+const SHARED_ALIASES: &[(&str, &str)] = &[
+    ("AXIS_REF", "AXIS_REF_SM3"),
+    ("SMC_VIRTUAL_AXIS", "AXIS_REF_SM3"),
+    // The CODESYS libraries whose names programs write before a block's.
+    ("Standard", "Takt"),
+    ("Util", "Takt"),
+    ("SM3_Basic", "Takt"),
+    ("SM3_CNC", "Takt"),
+];
 
 static BLOCKS: [&BlockDesc; cnc::BLOCKS.len() + motion::BLOCKS.len()] = join(&[cnc::BLOCKS, motion::BLOCKS]);
 static FUNCTIONS: [&FnDesc; cnc::FUNCTIONS.len() + motion::FUNCTIONS.len() + standard::FUNCTIONS.len()] =
@@ -72,6 +80,7 @@ mod tests {
         for name in blocks.chain(types).chain(LIBRARY.functions.iter().map(|f| f.name)) {
             assert!(names.insert(name.to_ascii_uppercase()), "{name} is declared twice");
         }
+        names.insert(LIBRARY.name.to_ascii_uppercase());
         for (alias, target) in LIBRARY.aliases {
             assert!(names.contains(&target.to_ascii_uppercase()), "{alias} stands for {target}, which nobody declares");
             assert!(names.insert(alias.to_ascii_uppercase()), "{alias} is declared twice");

@@ -246,10 +246,13 @@ impl<'a> Lowering<'_, 'a> {
                 Some(takt_syntax::tree::Init::Expr(e)) => {
                     let target = self.stored(storage, v.ty, v.span);
                     let Kind::Place(place) = target.kind else { return };
-                    let value = match self.c.types.get(v.ty) {
-                        Type::Reference(_) => self.expr(e),
-                        _ => self.expr(e),
-                    };
+                    if let Type::Reference(_) = self.c.types.get(v.ty) {
+                        if let Place::Register(local) = place {
+                            self.bind_initial(local, e);
+                        }
+                        return;
+                    }
+                    let value = self.expr(e);
                     if !value.is_error() {
                         self.assign_place(&place, v.ty, value, v.span);
                     }
@@ -304,6 +307,15 @@ impl<'a> Lowering<'_, 'a> {
     /// Names of variables whose address is asked for: by ADR, REF=, or as a VAR_IN_OUT.
     fn taken(&self, statements: &'a [Stmt]) -> HashSet<String> {
         let mut taken = HashSet::new();
+        let vars = self.pou.map_or(&[][..], |p| &self.c.pous[p].vars);
+        for v in vars {
+            if let Some(takt_syntax::tree::Init::Expr(e)) = v.init {
+                if let Type::Reference(_) = self.c.types.get(v.ty) {
+                    take_name(e, &mut taken);
+                }
+                self.taken_expr(e, &mut taken);
+            }
+        }
         for s in statements {
             self.taken_statement(s, &mut taken);
         }
@@ -384,7 +396,9 @@ impl<'a> Lowering<'_, 'a> {
         let local = self.pou.is_some_and(|p| self.c.pous[p].index.contains_key(&key(name)));
         match self.c.global_name(name) {
             _ if local => true,
-            Some(crate::scope::Item::Pou(i)) => self.c.pous[i].tree.vars.iter().any(|b| b.kind == VarKind::InOut),
+            Some(crate::scope::Item::Pou(i)) => self.c.pous[i].tree.vars.iter().any(|b| {
+                b.kind == VarKind::InOut || b.vars.iter().any(|v| matches!(v.ty.kind, takt_syntax::tree::TypeExprKind::Reference(_)))
+            }),
             Some(crate::scope::Item::NativeFunction(_)) => false,
             Some(_) => true,
             None => matches!(key(name).as_str(), "ADR" | "BITADR" | "REF" | "LOWER_BOUND" | "UPPER_BOUND"),

@@ -146,9 +146,10 @@ impl<'a> Lowering<'_, 'a> {
             }
         }
         let mut outputs = Vec::new();
+        let all_known = matched.len() == args.len();
         for (i, v) in vars.iter().enumerate() {
             let given = matched.iter().find(|(n, _)| *n == i).map(|(_, a)| *a);
-            if words[i].is_none() && given.is_none_or(|_| v.kind == VarKind::Output) {
+            if words[i].is_none() && given.is_none_or(|_| v.kind == VarKind::Output) && (all_known || v.kind == VarKind::Output) {
                 words[i] = self.missing_argument(&name, v, given, &mut outputs, span);
             }
         }
@@ -249,11 +250,31 @@ impl<'a> Lowering<'_, 'a> {
         match v.kind {
             VarKind::InOut => self.by_reference(&v.name, v.ty, value),
             _ => {
-                let operand = self.expr(value);
-                let operand = self.for_parameter(operand, v.ty)?;
+                let operand = match *self.c.types.get(v.ty) {
+                    Type::Reference(to) => self.reference_argument(value, v.ty, to)?,
+                    _ => {
+                        let operand = self.expr(value);
+                        self.for_parameter(operand, v.ty)?
+                    }
+                };
                 self.pass(v, operand)
             }
         }
+    }
+
+    /// What a REFERENCE parameter is given: a variable of its type.
+    fn reference_argument(&mut self, value: &'a Expr, ty: TypeId, to: TypeId) -> Option<Operand> {
+        let operand = self.expr(value);
+        if operand.is_error() {
+            return None;
+        }
+        if operand.ty != to {
+            let (wanted, found) = (self.type_name(to), self.operand_name(&operand));
+            self.report(Code::TypeMismatch, value.span, format!("expected a variable of type `{wanted}`, found {found}"));
+            return None;
+        }
+        let pointer = self.address_of(operand, value.span);
+        (!pointer.is_error()).then_some(Operand { ty, ..pointer })
     }
 
     /// The operand as the parameter's type; strings may keep their own length.
@@ -380,6 +401,7 @@ impl<'a> Lowering<'_, 'a> {
         for (i, field) in structure.fields.iter().enumerate().filter(|(_, f)| f.section == Section::InOut) {
             match matched.iter().find(|(n, _)| *n == i) {
                 Some((_, arg)) => self.set_in_out(&place, field, arg),
+                None if matched.len() != args.len() => {}
                 None => {
                     let (wanted, name) = (self.type_name(field.ty), &structure.name);
                     self.report(

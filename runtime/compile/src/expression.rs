@@ -509,6 +509,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
             );
             return Thing::Error;
         }
+        if *self.c.types.get(field.ty) == Type::Error {
+            return Thing::Error;
+        }
         let Kind::Place(place) = operand.kind else { return Thing::Error };
         let mut value = self.at(place.inside(field.offset), field.ty, span);
         value.fixed = operand.fixed;

@@ -149,6 +149,10 @@ impl<'a> Compiler<'a> {
 
     /// False if the expression is wrong.
     fn overlay_expr(&mut self, expr: &'a tree::Expr, ty: TypeId, at: u32, target: &mut Target<'a, '_>) -> bool {
+        if let Type::Reference(_) = self.types.get(ty) {
+            target.late.push((at, ty, expr));
+            return true;
+        }
         match self.known(expr, target.pou, Some(ty)).0 {
             Known::Value(value) => self.store_value(&value, ty, &mut target.bytes[at as usize..]),
             Known::Dynamic => target.late.push((at, ty, expr)),

@@ -438,9 +438,13 @@ impl<'a> Lowering<'_, 'a> {
         }
         let a = Operand { span, ..a };
         match (self.class(a.ty), to) {
-            (Class::Text | Class::Wide, Target::Text | Target::Wide) => a,
+            (Class::Text, Target::Text) | (Class::Wide, Target::Wide) => a,
+            (Class::Text | Class::Wide, _) if self.class(a.ty) == Class::Wide || to == Target::Wide => {
+                self.report(Code::NotSupported, span, "conversion to and from WSTRING is not supported yet");
+                self.error(span)
+            }
             (Class::Text, Target::Elem(e)) => self.number_of(a, e, span),
-            (Class::Other | Class::Wide, _) => self.refuse("this conversion", &a, span),
+            (Class::Other, _) => self.refuse("a conversion", &a, span),
             (_, Target::Elem(e)) => {
                 let ty = self.c.elem(e);
                 let result = self.explicit(Operand { flex: false, ..a }, ty);

@@ -237,6 +237,15 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
+    /// Binds a local REFERENCE where it is declared.
+    pub(crate) fn bind_initial(&mut self, local: Local, e: &'a Expr) {
+        let pointer = self.reference_to(e);
+        if !pointer.is_error() {
+            let src = self.value(&pointer);
+            self.b.push(Inst::Copy { dst: local, src });
+        }
+    }
+
     /// Sets a variable's initial value that is not bytes.
     pub(crate) fn set_initial(&mut self, base: Base, offset: u32, ty: TypeId, e: &'a Expr) {
         let mark = self.b.mark();
