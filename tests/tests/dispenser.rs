@@ -127,7 +127,7 @@ fn check_refused(bench: &mut Bench, file: &str, expected: &str) {
 fn bad_files_are_refused_with_their_place_and_the_machine_goes_on() {
     let mut bench = Bench::ready("bad-files");
     let head = "G90\nG00 X0 Y0 Z30 A0 B0 C0\n";
-    let cases: [(&str, &str, &str); 18] = [
+    let cases: [(&str, &str, &str); 20] = [
         ("empty.cnc", "", "empty"),
         ("word.cnc", "G01 X10 T3 F20\n", "word.cnc:3:"),
         ("missing.cnc", "G01 X F20\n", "missing.cnc:3:"),
@@ -143,6 +143,8 @@ fn bad_files_are_refused_with_their_place_and_the_machine_goes_on() {
         ("round.cnc", "G01 X10 C500 F20\n", "Theta1"),
         ("m.cnc", "M55\n", "M55"),
         ("twice.cnc", "G00 G01 X10 F20\n", "twice.cnc:3:"),
+        ("jump.cnc", "G92 X100\nG01 X105 F20\n", "jump.cnc:4: the path jumps"),
+        ("alone.cnc", "M30\n", "no path"),
         ("where.cnc", "", "X, Y and Z"),
         ("nothing.cnc", "", "no move"),
         ("dwell.cnc", "G04 T-1\n", "dwell.cnc:3:"),
@@ -381,6 +383,31 @@ fn the_valve_never_fires_faster_than_it_can() {
     let rows = bench.job();
     let times: Vec<usize> = rows.windows(2).enumerate().filter(|(_, w)| w[1].dots > w[0].dots).map(|(i, _)| i).collect();
     assert!(times.len() > 25 && times.windows(2).all(|w| w[1] - w[0] >= 20), "{times:?}");
+}
+
+#[test]
+fn a_job_that_begins_at_the_origin_dispenses_its_first_move() {
+    let mut bench = Bench::ready("origin");
+    bench.file("origin.cnc", "G0 X0 Y0 Z0\nM08\nG1 X10 F20\nG1 Y10\nM09\nM30\n");
+    bench.set("GVL.NcFile", "'origin.cnc'");
+    let rows = bench.job();
+    assert_eq!(dots(&rows).len(), 13);
+    assert!((bench.number("GVL.JobTime") - 1.3).abs() < 0.01);
+}
+
+#[test]
+fn what_an_operator_types_while_the_job_runs_is_held_to_its_range() {
+    let mut bench = Bench::ready("typed");
+    bench.start();
+    bench.run(6.0);
+    bench.set("GVL.Par.DotPitch", "0.0");
+    bench.set("GVL.Par.Override", "0.0");
+    bench.set("GVL.Par.L3", "90.0");
+    let (before, place) = (bench.number("GVL.DotCount"), bench.number("GVL.Sts.PathLength"));
+    bench.run(10.0);
+    assert!(bench.number("GVL.Sts.PathLength") > place, "the machine stands still");
+    assert!(bench.number("GVL.DotCount") - before < 10.0 * 20.0 / 0.1);
+    assert_eq!((bench.state(), bench.text("GVL.ErrorText").as_str()), ("Running", ""));
 }
 
 #[test]
