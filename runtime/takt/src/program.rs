@@ -65,6 +65,12 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
 }
 
 impl Compiled {
+    /// Whether an error stands in a source; else all of them stand in conditions of the manifest or the command line.
+    pub fn errors_in_sources(&self) -> bool {
+        let error = |d: &&takt_syntax::Diagnostic| d.severity() == takt_syntax::Severity::Error;
+        self.diagnostics.iter().filter(error).any(|d| (d.span.file.0 as usize) < self.first_condition)
+    }
+
     /// Errors and warnings, counted.
     pub fn counts(&self) -> (usize, usize) {
         let errors = self.diagnostics.iter().filter(|d| d.severity() == Severity::Error).count();

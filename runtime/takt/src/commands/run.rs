@@ -93,8 +93,7 @@ fn refuse(error: &BuildError) -> Exit {
             check::tell(compiled);
             let (errors, warnings) = compiled.counts();
             check::summarise(errors, warnings);
-            let of_user = |d: &takt_syntax::Diagnostic| compiled.locate(d.span).file != "--until";
-            if compiled.diagnostics.iter().any(of_user) { Exit::Findings } else { Exit::Usage }
+            if compiled.errors_in_sources() { Exit::Findings } else { Exit::Usage }
         }
         BuildError::Manifest(errors) => {
             console::tell(format_args!("{}\n", messages::draw_manifest(errors)));

@@ -30,7 +30,7 @@ fn fault(record: &FaultRecord) -> Value {
     let frame = |frame: &Frame| json!({ "file": frame.file, "line": frame.line, "column": frame.column, "body": frame.body });
     json!({
         "code": record.fault.name(), "message": record.fault.to_string(), "file": record.place.file, "line": record.place.line,
-        "task": record.task, "stack": record.stack.iter().map(frame).collect::<Vec<_>>(),
+        "task": record.task, "stack": std::iter::once(&record.place).chain(&record.stack).map(frame).collect::<Vec<_>>(),
     })
 }
 
