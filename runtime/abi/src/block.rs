@@ -5,7 +5,7 @@ use crate::fault::Fault;
 use crate::plain::Plain;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Runs the body of a native block: copies the fields out of the image, runs, copies them back; a panic becomes a fault. Called by [`function_block!`].
+/// Runs the body of a native block: copies the fields out of the image, runs, copies them back; a panic becomes a fault. Called by [`crate::function_block!`].
 ///
 /// # Safety
 /// As [`crate::NativeFn`]; nobody else touches the image, `ctx` or its `env` meanwhile.

@@ -161,11 +161,11 @@ impl<'a> Cx<'a> {
     pub fn deref<T: Plain>(&self, pointer: Ptr<T>) -> Result<T, Fault> {
         self.load(pointer.0)
     }
-    /// Loads element `i` (counted from 0) of an ARRAY[*].
+    /// Loads element `i` (counted from 0) of an `ARRAY[*]`.
     pub fn element<T: Plain>(&self, array: OpenArray<T>, i: usize) -> Result<T, Fault> {
         self.load(self.element_offset(array, i)?)
     }
-    /// Stores element `i` (counted from 0) of an ARRAY[*].
+    /// Stores element `i` (counted from 0) of an `ARRAY[*]`.
     pub fn set_element<T: Plain>(&mut self, array: OpenArray<T>, i: usize, value: &T) -> Result<(), Fault> {
         let offset = self.element_offset(array, i)?;
         self.store(offset, value)

@@ -58,7 +58,7 @@ pub enum FieldType {
     Enum(&'static EnumDesc),
     /// POINTER TO.
     Pointer(&'static FieldType),
-    /// ARRAY[*] OF elem; only as VAR_IN_OUT of a block.
+    /// `ARRAY[*]` OF elem; only as VAR_IN_OUT of a block.
     OpenArray(&'static FieldType),
 }
 

@@ -235,7 +235,7 @@ impl<T: Plain> Plain for InOut<T> {
     }
 }
 
-/// A block's VAR_IN_OUT of type ARRAY[*] OF T: offset of the first element and bounds, written by the caller, checked again at each use.
+/// A block's VAR_IN_OUT of type `ARRAY[*]` OF T: offset of the first element and bounds, written by the caller, checked again at each use.
 #[repr(C)]
 pub struct OpenArray<T> {
     /// Offset of the element with index `low`.

@@ -17,7 +17,7 @@ pub(crate) enum Passing {
     Value(Ty),
     /// An address of so many bytes.
     Address(u32),
-    /// ARRAY[*]: pointer, then low and high per dimension.
+    /// `ARRAY[*]`: pointer, then low and high per dimension.
     Open(u32),
 }
 

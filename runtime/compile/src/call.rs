@@ -308,7 +308,7 @@ impl<'a> Lowering<'_, 'a> {
         Some(self.b.address(Base::Frame, slot, size))
     }
 
-    /// What a VAR_IN_OUT is given: an address, or pointer and bounds for ARRAY[*].
+    /// What a VAR_IN_OUT is given: an address, or pointer and bounds for `ARRAY[*]`.
     fn by_reference(&mut self, name: &str, ty: TypeId, value: &'a Expr) -> Option<Vec<Local>> {
         let operand = self.expr(value);
         if operand.is_error() {

@@ -16,7 +16,7 @@ pub(crate) enum Place {
     Register(Local),
     /// Bits of an integer place.
     Bits { whole: Box<Place>, ty: TypeId, shift: u32, width: u32 },
-    /// ARRAY[*]: pointer to the first element, bounds per dimension.
+    /// `ARRAY[*]`: pointer to the first element, bounds per dimension.
     Open { pointer: Local, bounds: Vec<(Local, Local)> },
 }
 

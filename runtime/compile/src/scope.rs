@@ -24,7 +24,7 @@ pub(crate) enum Storage {
     Register(Local),
     /// Behind an address that a local holds (VAR_IN_OUT, large parameters and results).
     Behind(Local),
-    /// ARRAY[*]: pointer and bounds in locals.
+    /// `ARRAY[*]`: pointer and bounds in locals.
     Open(Local, Vec<(Local, Local)>),
     /// Not laid out yet, or nothing but its constant value.
     Nowhere,

@@ -306,7 +306,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    /// A variable's type; ARRAY[*] is only for VAR_IN_OUT.
+    /// A variable's type; `ARRAY[*]` is only for VAR_IN_OUT.
     fn variable_type(&mut self, decl: &'a tree::VarDecl, pou: Option<usize>) -> TypeId {
         let ty = self.type_expr(&decl.ty, pou, true);
         if let Type::OpenArray { .. } = self.types.get(ty) {

@@ -76,7 +76,7 @@ pub enum Type {
         /// Bounds per dimension, the last runs fastest.
         dims: Vec<(i64, i64)>,
     },
-    /// ARRAY[*, …]: only as VAR_IN_OUT.
+    /// `ARRAY[*, …]`: only as VAR_IN_OUT.
     OpenArray {
         /// Element.
         elem: TypeId,

@@ -40,7 +40,7 @@ impl Bench {
     }
 }
 
-/// ARRAY[*] at an offset, with indices from 0.
+/// `ARRAY[*]` at an offset, with indices from 0.
 pub fn open<T: Plain>(offset: u64, len: usize) -> OpenArray<T> {
     let mut raw = [0; 24];
     offset.store(&mut raw);
