@@ -21,6 +21,7 @@ pub static LIBRARY: Library = Library {
         ("counters.st", include_str!("../st/counters.st")),
         ("edges.st", include_str!("../st/edges.st")),
         ("latches.st", include_str!("../st/latches.st")),
+        ("system.st", include_str!("../st/system.st")),
         ("timers.st", include_str!("../st/timers.st")),
     ],
 };
@@ -36,6 +37,7 @@ const SHARED_ALIASES: &[(&str, &str)] = &[
     ("Util", "Takt"),
     ("SM3_Basic", "Takt"),
     ("SM3_CNC", "Takt"),
+    ("__SYSTEM", "Takt"),
 ];
 
 static BLOCKS: [&BlockDesc; cnc::BLOCKS.len() + motion::BLOCKS.len()] = join(&[cnc::BLOCKS, motion::BLOCKS]);

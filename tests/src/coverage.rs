@@ -138,6 +138,11 @@ fn rows_of(body: &Body, insts: &[Inst], term: &Term) -> Vec<String> {
             Inst::Call { dst, .. } => format!("call gives {}", result(dst)),
             Inst::Native { dst, .. } => format!("native gives {}", result(dst)),
             Inst::Poll { .. } => "poll".into(),
+            Inst::Virtual { dst, .. } => format!("virtual call gives {}", result(dst)),
+            Inst::IsA { .. } => "is a".into(),
+            Inst::Place { .. } => "place".into(),
+            Inst::Guard { .. } => "guard".into(),
+            Inst::Catch { .. } => "catch".into(),
         };
         rows.push(row);
     }

@@ -6,7 +6,7 @@
 use crate::generate::Random;
 use std::cell::RefCell;
 use std::sync::atomic::AtomicU32;
-use takt_abi::{Context, Env, Fault, NoHost, Resources, TRACE_DEPTH, Time};
+use takt_abi::{Context, Env, Fault, NoHost, Time};
 use takt_ir::{BodyId, Interpreter, Program};
 use takt_jit::Code;
 
@@ -97,34 +97,12 @@ fn run(program: &Program, start: Start, mut executor: impl FnMut(BodyId, u64, &m
     let mut image = vec![0; program.image_size as usize];
     image[..program.init.len()].copy_from_slice(&program.init);
     let period = Time(10_000_000);
-    let mut env = Env {
-        now: Time(0),
-        period,
-        task: 0,
-        cycle: 0,
-        bus_task: 0,
-        bus_period: period,
-        resources: Resources::default(),
-        host: Box::new(NoHost),
-    };
+    let mut env = Env::new(period, Box::new(NoHost));
+    (env.classes, env.heap) = (program.instances(), program.heap());
     let task = &program.tasks[0];
     let (entry, (frame, size)) = (task.entry, task.stack);
-    let mut ctx = Context {
-        flag: AtomicU32::new(0),
-        fault_code: 0,
-        fuel: 0,
-        fault_site: u32::MAX,
-        trace_len: 0,
-        fault_facts: [0; 3],
-        depth: 0,
-        depth_limit: start.depth_limit,
-        image: image.as_mut_ptr(),
-        image_size: program.image_size.into(),
-        stack_end: u64::from(frame) + u64::from(size.min(start.stack)),
-        poll,
-        trace: [0; TRACE_DEPTH],
-        env: &raw mut env,
-    };
+    let mut ctx = Context::new(image.as_mut_ptr(), program.image_size.into(), &mut env, poll);
+    (ctx.depth_limit, ctx.stack_end) = (start.depth_limit, u64::from(frame) + u64::from(size.min(start.stack)));
     let (mut fuel, mut depth) = (Vec::new(), Vec::new());
     let mut code = 0;
     POLLS.replace(Polls { left: start.slow_polls, sites: Vec::new() });

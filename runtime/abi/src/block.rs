@@ -430,16 +430,7 @@ mod tests {
     }
 
     fn env() -> Env {
-        Env {
-            now: Time(0),
-            period: Time(1),
-            task: 0,
-            cycle: 0,
-            bus_task: 0,
-            bus_period: Time(1),
-            resources: Resources::default(),
-            host: Box::new(NoHost),
-        }
+        Env::new(Time(1), Box::new(NoHost))
     }
 
     #[allow(unsafe_code, reason = "plays the engine")]
@@ -450,22 +441,8 @@ mod tests {
     #[allow(unsafe_code, reason = "plays compiled code")]
     fn call(image: &mut [u8], this: u64) -> Option<Fault> {
         let mut env = env();
-        let mut ctx = Context {
-            flag: 0.into(),
-            fault_code: 0,
-            fuel: 100,
-            fault_site: 0,
-            trace_len: 0,
-            fault_facts: [0; 3],
-            depth: 0,
-            depth_limit: 10,
-            image: image.as_mut_ptr(),
-            image_size: image.len() as u64,
-            stack_end: 0,
-            poll: no_poll,
-            trace: [0; TRACE_DEPTH],
-            env: &mut env,
-        };
+        let mut ctx = Context::new(image.as_mut_ptr(), image.len() as u64, &mut env, no_poll);
+        ctx.fuel = 100;
         let mut args = [this];
         let cycle = Tally::DESC.cycle.expect("has a body");
         // SAFETY: context, image and arguments are alive and ours.

@@ -1,6 +1,8 @@
 //! What a running scan carries: [`Context`] for compiled code, [`Env`] for the engine, [`Cx`] for native blocks.
 
+use crate::class::Classes;
 use crate::fault::Fault;
+use crate::heap::Heap;
 use crate::host::Host;
 use crate::plain::{OpenArray, Plain, Ptr};
 use crate::resource::Resources;
@@ -48,9 +50,31 @@ pub struct Context {
     pub trace: [u32; TRACE_DEPTH],
     /// The engine's side.
     pub env: *mut Env,
+    /// First entry of the table of instances ([`Classes::start`]); it has one for each granule of the image if the program has classes.
+    pub classes: *const AtomicU32,
 }
 
 impl Context {
+    /// A context on an image, with no fuel, no stack region and no recursion yet.
+    pub fn new(image: *mut u8, image_size: u64, env: &mut Env, poll: PollFn) -> Self {
+        Self {
+            flag: 0.into(),
+            fault_code: 0,
+            fuel: 0,
+            fault_site: u32::MAX,
+            trace_len: 0,
+            fault_facts: [0; 3],
+            depth: 0,
+            depth_limit: 0,
+            image,
+            image_size,
+            stack_end: 0,
+            poll,
+            trace: [0; TRACE_DEPTH],
+            classes: env.classes.start(),
+            env,
+        }
+    }
     /// Records a fault at a site and returns its code.
     pub fn fail(&mut self, fault: Fault, site: u32) -> u32 {
         self.fault_code = fault.code();
@@ -90,6 +114,28 @@ pub struct Env {
     pub resources: Resources,
     /// Files.
     pub host: Box<dyn Host>,
+    /// What instances stand where.
+    pub classes: Classes,
+    /// What `__NEW` gives.
+    pub heap: Heap,
+}
+
+impl Env {
+    /// An environment at time 0 for task 0, which owns the bus, without resources, instances and heap.
+    pub fn new(period: Time, host: Box<dyn Host>) -> Self {
+        Self {
+            now: Time(0),
+            period,
+            task: 0,
+            cycle: 0,
+            bus_task: 0,
+            bus_period: period,
+            resources: Resources::default(),
+            host,
+            classes: Classes::default(),
+            heap: Heap::default(),
+        }
+    }
 }
 
 impl std::fmt::Debug for Env {

@@ -41,6 +41,11 @@ pub enum Fault {
     WrongDelete,
     /// The run was stopped from outside.
     Stopped,
+    /// A method was called through a pointer, reference or interface that does not lead to an instance that has it.
+    NoInstance {
+        /// The offset.
+        offset: u64,
+    },
 }
 
 impl Fault {
@@ -57,7 +62,12 @@ impl Fault {
             Self::Panic => 8,
             Self::WrongDelete => 9,
             Self::Stopped => 10,
+            Self::NoInstance { .. } => 11,
         }
+    }
+    /// Whether a program may handle it with `__TRY`: what its own data led to, not what stops it from outside.
+    pub fn catchable(code: u32) -> bool {
+        matches!(code, 1..=4 | 7 | 9 | 11)
     }
     /// The facts as three words, for [`crate::Context`].
     pub fn facts(self) -> [i64; 3] {
@@ -66,6 +76,7 @@ impl Fault {
             Self::WildPointer { offset, size } => [offset as i64, size as i64, 0],
             Self::StackOverflow { depth } => [depth.into(), 0, 0],
             Self::Block { error } => [error.into(), 0, 0],
+            Self::NoInstance { offset } => [offset as i64, 0, 0],
             _ => [0; 3],
         }
     }
@@ -82,6 +93,7 @@ impl Fault {
             7 => Self::Block { error: facts[0] as u32 },
             9 => Self::WrongDelete,
             10 => Self::Stopped,
+            11 => Self::NoInstance { offset: facts[0] as u64 },
             _ => Self::Panic,
         })
     }
@@ -98,6 +110,7 @@ impl Fault {
             Self::Panic => "internal-panic",
             Self::WrongDelete => "wrong-delete",
             Self::Stopped => "stopped",
+            Self::NoInstance { .. } => "no-instance",
         }
     }
 }
@@ -115,6 +128,7 @@ impl std::fmt::Display for Fault {
             Self::Panic => write!(f, "internal defect of Takt in a block; please report it"),
             Self::WrongDelete => write!(f, "__DELETE of memory that __NEW did not give"),
             Self::Stopped => write!(f, "stopped on request"),
+            Self::NoInstance { offset } => write!(f, "16#{offset:X} is no instance of a block that can be called here"),
         }
     }
 }

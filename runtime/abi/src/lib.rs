@@ -9,18 +9,22 @@
 
 mod axis;
 mod block;
+mod class;
 mod context;
 mod desc;
 mod fault;
+mod heap;
 mod host;
 mod plain;
 mod resource;
 
 pub use axis::{AxisRef, AxisState, BufferMode, ControllerMode, Direction, SmcError};
 pub use block::{Arg, run_block, run_function};
+pub use class::{Classes, GRANULE};
 pub use context::{Context, Cx, Env, PollFn, TRACE_DEPTH};
 pub use desc::{BlockDesc, Elem, EnumDesc, FieldDesc, FieldType, FnDesc, Library, NativeFn, ParamDesc, Section, StructDesc};
 pub use fault::Fault;
+pub use heap::Heap;
 pub use host::{CHUNK, Chunk, Folder, Host, HostError, NoHost, Request, Ticket};
 pub use plain::{Bool, Byte, Dword, InOut, Lword, OpenArray, Plain, Ptr, StDate, StDateTime, StLtime, StTime, StTimeOfDay, Str, Word};
 pub use resource::{Handle, Resource, Resources};

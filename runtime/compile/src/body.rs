@@ -3,11 +3,11 @@
 use crate::expression::{Kind, Lowering};
 use crate::initial::Target;
 use crate::place::{Place, mem};
-use crate::scope::{Storage, Variable, key};
-use crate::unit::{Compiler, Job};
+use crate::scope::{PouKind, Storage, Variable, key};
+use crate::unit::Compiler;
 use std::collections::HashSet;
 use takt_ir::{Base, Body, BodyId, Inst, Local, Ty, Type, TypeId};
-use takt_syntax::tree::{ArgKind, Expr, ExprKind, PouKind, Stmt, StmtKind, VarKind};
+use takt_syntax::tree::{ArgKind, Expr, ExprKind, Stmt, StmtKind, VarKind};
 use takt_syntax::{Code, FileId, Source, Span};
 
 /// How a variable of a function is passed, in the order of the IR's parameters.
@@ -21,12 +21,23 @@ pub(crate) enum Passing {
     Open(u32),
 }
 
+impl Passing {
+    /// Types of the locals that it takes.
+    pub(crate) fn locals(&self) -> Vec<Ty> {
+        match self {
+            Self::Value(ty) => vec![*ty],
+            Self::Address(size) => vec![Ty::Addr(*size)],
+            Self::Open(dims) => vec![Ty::I64; 1 + 2 * *dims as usize],
+        }
+    }
+}
+
 impl<'a> Compiler<'a> {
     /// The class of local that a scalar type takes; `None` for what lies in memory only.
     pub(crate) fn register(&self, ty: TypeId) -> Option<Ty> {
         match self.types.get(ty) {
             Type::Elem(e) | Type::Subrange { base: e, .. } => Some(mem(*e).ty()),
-            Type::Enum(_) | Type::Pointer(_) | Type::Reference(_) | Type::Error => Some(Ty::I64),
+            Type::Enum(_) | Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) | Type::Error => Some(Ty::I64),
             _ => None,
         }
     }
@@ -44,19 +55,11 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    pub(crate) fn lower_body(&mut self, id: BodyId, job: Job) -> Body {
-        let (pou, action) = match job {
-            Job::Pou(pou) => (pou, None),
-            Job::Action(pou, action) => (pou, Some(action)),
-        };
-        let tree = self.pous[pou].tree;
-        let (name, statements) = match action {
-            Some(action) => (format!("{}.{}", tree.name.text, tree.actions[action].name.text), &tree.actions[action].body),
-            None => (tree.name.text.clone(), &tree.body),
-        };
+    pub(crate) fn lower_body(&mut self, id: BodyId, pou: usize) -> Body {
+        let (tree, name) = (self.pous[pou].tree, self.pou_name(pou));
         let mut lowering = Lowering::new(self, id, &name, Some(pou), tree.name.span);
-        lowering.open_unit(statements);
-        lowering.statements(statements);
+        lowering.open_unit(tree.body);
+        lowering.statements(tree.body);
         lowering.check_labels();
         lowering.return_();
         lowering.finish()
@@ -90,21 +93,24 @@ impl<'a> Lowering<'_, 'a> {
     /// Parameters, result and local variables of the unit.
     fn open_unit(&mut self, statements: &'a [Stmt]) {
         let Some(pou) = self.pou else { return };
-        let tree = self.c.pous[pou].tree;
-        match tree.kind {
-            PouKind::Function => self.open_function(pou, statements),
-            PouKind::FunctionBlock => {
-                let ty = self.c.pous[pou].ty.unwrap_or(TypeId(0));
-                let size = self.c.types.size(ty);
-                self.this = Some(self.b.param(Ty::Addr(size)));
+        self.open_instance();
+        match self.c.pous[pou].tree.kind {
+            PouKind::Function | PouKind::Method => self.open_function(pou, statements),
+            PouKind::FunctionBlock | PouKind::Program => {
                 self.open_in_outs(pou);
-                self.open_locals(pou, statements);
+                self.open_locals(0, statements);
             }
-            PouKind::Program => {
-                self.open_in_outs(pou);
-                self.open_locals(pou, statements);
-            }
+            // An action has the temporary variables of its block anew.
+            PouKind::Action => self.open_locals(1, statements),
         }
+    }
+
+    /// The instance that a body of a block runs on.
+    pub(crate) fn open_instance(&mut self) {
+        let Some(class) = self.block().filter(|c| self.c.pous[*c].tree.kind == PouKind::FunctionBlock) else { return };
+        let ty = self.c.pou_type(class);
+        let size = self.c.types.size(ty);
+        self.this = Some(self.b.param(Ty::Addr(size)));
     }
 
     fn open_function(&mut self, pou: usize, statements: &'a [Stmt]) {
@@ -113,7 +119,7 @@ impl<'a> Lowering<'_, 'a> {
         let mut copies = Vec::new();
         for (i, v) in vars.iter().enumerate() {
             let Some(passing) = self.c.passing(v) else { continue };
-            self.storage[i] = match passing {
+            let storage = match passing {
                 Passing::Value(ty) => {
                     let param = self.b.param(ty);
                     if taken.contains(&key(&v.name)) {
@@ -134,6 +140,7 @@ impl<'a> Lowering<'_, 'a> {
                     Storage::Open(pointer, bounds)
                 }
             };
+            self.own_storage()[i] = storage;
         }
         let result = self.c.pous[pou].result;
         let place = result.filter(|ty| self.c.register(*ty).is_none()).map(|ty| self.b.param(Ty::Addr(self.c.types.size(ty))));
@@ -141,17 +148,17 @@ impl<'a> Lowering<'_, 'a> {
             self.copy_parameter(&vars[i], i, param);
         }
         for (i, v) in vars.iter().enumerate().filter(|(_, v)| v.kind == VarKind::Output) {
-            let storage = self.storage[i].clone();
+            let storage = self.own_storage()[i].clone();
             self.initialise_variable(v, &storage);
         }
         self.open_result(pou, result, place, &taken);
-        self.open_locals_with(pou, &taken);
+        self.open_locals_with(0, &taken);
     }
 
     fn copy_parameter(&mut self, v: &Variable<'a>, i: usize, param: Local) {
         let (size, align) = self.c.types.layout(v.ty);
         let slot = self.b.slot(size, align);
-        self.storage[i] = Storage::Frame(slot);
+        self.own_storage()[i] = Storage::Frame(slot);
         match self.b.ty(param) {
             Ty::Addr(_) => {
                 self.b.push(Inst::Move { dst: Base::Frame, dst_offset: slot, src: Base::Local(param), src_offset: 0, len: size })
@@ -188,41 +195,29 @@ impl<'a> Lowering<'_, 'a> {
                 continue;
             }
             let (ty, span) = (v.ty, v.span);
-            let (base, offset) = match self.storage[i] {
-                Storage::This(offset) => (self.this.map_or(Base::Image, Base::Local), offset),
-                Storage::Image(offset) => (Base::Image, offset),
-                _ => continue,
+            let storage = self.storage_of(0, i);
+            let opened = match self.follow_in_out(&storage, ty, span).kind {
+                Kind::Place(Place::Memory { base: Base::Local(address), .. }) => Storage::Behind(address),
+                Kind::Place(Place::Open { pointer, bounds }) => Storage::Open(pointer, bounds),
+                _ => Storage::Nowhere,
             };
-            let word = |l: &mut Self, at: u32| {
-                let dst = l.b.local(Ty::I64);
-                l.b.push(Inst::Load { dst, mem: takt_ir::Mem::I64, base, offset: offset + at });
-                dst
-            };
-            let pointer = word(self, 0);
-            self.storage[i] = match *self.c.types.get(ty) {
-                Type::OpenArray { dims, .. } => {
-                    let bounds = (0..dims).map(|d| (word(self, 8 + 16 * d), word(self, 16 + 16 * d))).collect();
-                    Storage::Open(pointer, bounds)
-                }
-                _ => match self.deref(pointer, ty, span) {
-                    Place::Memory { base: Base::Local(address), .. } => Storage::Behind(address),
-                    _ => Storage::Nowhere,
-                },
-            };
+            self.own_storage()[i] = opened;
         }
     }
 
-    fn open_locals(&mut self, pou: usize, statements: &'a [Stmt]) {
+    fn open_locals(&mut self, level: usize, statements: &'a [Stmt]) {
         let taken = self.taken(statements);
-        self.open_locals_with(pou, &taken);
+        self.open_locals_with(level, &taken);
     }
 
     /// Variables that live for one call: in registers where nobody asks for their address.
-    fn open_locals_with(&mut self, pou: usize, taken: &HashSet<String>) {
-        let function = self.c.pous[pou].tree.kind == PouKind::Function;
+    fn open_locals_with(&mut self, level: usize, taken: &HashSet<String>) {
+        let pou = self.levels[level].pou;
+        let function = matches!(self.c.pous[pou].tree.kind, PouKind::Function | PouKind::Method);
         for i in 0..self.c.pous[pou].vars.len() {
             let v = self.c.pous[pou].vars[i].clone();
-            let local = v.kind == VarKind::Temp || function && matches!(v.kind, VarKind::Var | VarKind::Inst);
+            let kept = v.kind == VarKind::Inst && v.storage != Storage::Nowhere;
+            let local = v.kind == VarKind::Temp || function && !kept && matches!(v.kind, VarKind::Var | VarKind::Inst);
             if !local || v.value.is_some() {
                 continue;
             }
@@ -233,7 +228,7 @@ impl<'a> Lowering<'_, 'a> {
                     Storage::Frame(self.b.slot(size, align))
                 }
             };
-            self.storage[i] = storage.clone();
+            self.level_storage(level)[i] = storage.clone();
             self.initialise_variable(&v, &storage);
         }
     }
@@ -271,8 +266,11 @@ impl<'a> Lowering<'_, 'a> {
         let Kind::Place(Place::Memory { base, offset }) = operand.kind else { return };
         let data = self.pool(&bytes);
         self.b.push(Inst::Data { dst: base, offset, data, len: bytes.len() as u32 });
-        for (at, ty, e) in late {
-            self.set_initial(base, offset + at, ty, e);
+        if base == Base::Frame {
+            self.put_instances(v.ty, offset, 1);
+        }
+        for late in late {
+            self.set_late(base, offset, late);
         }
     }
 
@@ -307,8 +305,7 @@ impl<'a> Lowering<'_, 'a> {
     /// Names of variables whose address is asked for: by ADR, REF=, or as a VAR_IN_OUT.
     fn taken(&self, statements: &'a [Stmt]) -> HashSet<String> {
         let mut taken = HashSet::new();
-        let vars = self.pou.map_or(&[][..], |p| &self.c.pous[p].vars);
-        for v in vars {
+        for v in self.levels.iter().take(2).flat_map(|l| &self.c.pous[l.pou].vars) {
             if let Some(takt_syntax::tree::Init::Expr(e)) = v.init {
                 if let Type::Reference(_) = self.c.types.get(v.ty) {
                     take_name(e, &mut taken);
@@ -393,7 +390,7 @@ impl<'a> Lowering<'_, 'a> {
     /// Whether a call may ask for the address of an argument. Unknown callees may.
     fn takes_addresses(&self, callee: &Expr) -> bool {
         let ExprKind::Name(name) = &callee.kind else { return true };
-        let local = self.pou.is_some_and(|p| self.c.pous[p].index.contains_key(&key(name)));
+        let local = self.local(&key(name)).is_some() || self.block().is_some();
         match self.c.global_name(name) {
             _ if local => true,
             Some(crate::scope::Item::Pou(i)) => self.c.pous[i].tree.vars.iter().any(|b| {

@@ -2,9 +2,10 @@
 
 use crate::body::Passing;
 use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
+use crate::object::Target;
 use crate::operator::Class;
 use crate::place::Place;
-use crate::scope::{Variable, key};
+use crate::scope::{Owner, PouKind, Variable, key};
 use crate::types::nearest;
 use takt_abi::{FnDesc, Section};
 use takt_ir::{Base, Field, Inst, Local, Mem, StructKind, Structure, Ty, Type, TypeId};
@@ -15,24 +16,33 @@ impl<'a> Lowering<'_, 'a> {
     pub(crate) fn call(&mut self, callee: &'a Expr, args: &'a [Arg], span: Span) -> Operand {
         if let ExprKind::Name(name) = &callee.kind {
             let wanted = key(name);
-            let local = self.pou.is_some_and(|p| {
-                let pou = &self.c.pous[p];
-                pou.index.contains_key(&wanted) || pou.actions.iter().any(|(n, _)| *n == wanted)
-            });
+            let variable = self.local(&wanted).is_some();
+            let local = variable || self.block().is_some_and(|c| self.c.member_of(c, &wanted).is_some());
+            if let (false, true) = (local, wanted.starts_with("__"))
+                && let Some(result) = self.system_function(name, args, span)
+            {
+                return result;
+            }
             if !local
                 && self.c.global_name(name).is_none_or(|i| matches!(i, crate::scope::Item::Member(..) | crate::scope::Item::Enumerator(..)))
             {
                 return self.intrinsic(name, callee.span, args, span);
             }
-            let own_name = self.pou.is_some_and(|p| self.result.is_some() && key(&self.c.pous[p].tree.name.text) == wanted);
-            if own_name && !local {
-                return self.call_function(self.pou.unwrap_or(0), args, span);
+            let recursive = self.pou.filter(|p| self.is_result(*p, &wanted) && !variable);
+            match recursive {
+                Some(pou) if self.c.pous[pou].tree.kind == PouKind::Function => return self.call_function(pou, args, span),
+                Some(_) => {
+                    if let Some(Thing::Member(bound)) = self.own_member(&wanted, span) {
+                        return self.call_member(*bound, args, span);
+                    }
+                }
+                None => {}
             }
         }
         match self.thing(callee) {
             Thing::Function(pou) => self.call_function(pou, args, span),
             Thing::Native(desc) => self.call_native(desc, args, span),
-            Thing::Action(pou, action, instance) => self.call_action(pou, action, instance, args, span),
+            Thing::Member(bound) => self.call_member(*bound, args, span),
             Thing::Value(operand) => self.call_instance(operand, args, span),
             Thing::Type(ty) => {
                 let name = self.type_name(ty);
@@ -59,28 +69,13 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
-    fn call_action(&mut self, pou: usize, action: usize, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
-        if let Some(arg) = args.first() {
-            self.report(Code::BadArgument, arg.span, "an action takes no arguments");
-        }
-        let body = self.c.action_of(pou, action);
-        let site = self.site(span);
-        let mut words = Vec::new();
-        if self.c.pous[pou].tree.kind == takt_syntax::tree::PouKind::FunctionBlock {
-            let Kind::Place(place) = &instance.kind else { return self.error(span) };
-            words.push(self.address(place, self.c.types.size(instance.ty)));
-        }
-        self.b.push(Inst::Call { body, args: words, dst: None, site });
-        self.void(span)
-    }
-
-    fn void(&mut self, span: Span) -> Operand {
+    pub(crate) fn void(&mut self, span: Span) -> Operand {
         let operand = self.error(span);
         Operand { kind: Kind::Void, ..operand }
     }
 
     /// Which parameter each argument is for; wrong ones are reported and left out.
-    fn match_arguments(&mut self, callee: &str, names: &[(&str, Section)], args: &'a [Arg], span: Span) -> Vec<(usize, &'a Arg)> {
+    fn match_arguments(&mut self, callee: &str, names: &[(&str, Section)], args: &'a [Arg]) -> Vec<(usize, &'a Arg)> {
         let mut matched: Vec<(usize, &'a Arg)> = Vec::new();
         let positional: Vec<usize> = names.iter().enumerate().filter(|(_, n)| n.1 != Section::State).map(|(i, _)| i).collect();
         for (position, arg) in args.iter().enumerate() {
@@ -113,7 +108,6 @@ impl<'a> Lowering<'_, 'a> {
             }
             matched.push((i, arg));
         }
-        let _ = span;
         matched
     }
 
@@ -133,13 +127,23 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     fn call_function(&mut self, pou: usize, args: &'a [Arg], span: Span) -> Operand {
+        self.call_unit(pou, Target::Plain, Vec::new(), args, span)
+    }
+
+    /// Calls a function, method or action. What is `preset` (by number of the parameter) is not among the arguments.
+    pub(crate) fn call_unit(&mut self, pou: usize, target: Target, preset: Vec<(usize, Operand)>, args: &'a [Arg], span: Span) -> Operand {
         self.c.resolve_pou(pou, span);
         let vars: Vec<Variable<'a>> = self.c.pous[pou].vars.iter().filter(|v| self.c.passing(v).is_some()).cloned().collect();
         let name = self.c.pous[pou].tree.name.text.clone();
-        let names: Vec<(&str, Section)> = vars.iter().map(|v| (v.name.as_str(), section(v.kind))).collect();
-        let matched = self.match_arguments(&name, &names, args, span);
+        let is_preset = |i: usize| preset.iter().any(|(p, _)| *p == i);
+        let names: Vec<(&str, Section)> =
+            vars.iter().enumerate().map(|(i, v)| (v.name.as_str(), if is_preset(i) { Section::State } else { section(v.kind) })).collect();
+        let matched = self.match_arguments(&name, &names, args);
         let before = self.c.diagnostics.len();
         let mut words: Vec<Option<Vec<Local>>> = vec![None; vars.len()];
+        for (i, operand) in preset {
+            words[i] = vars.get(i).and_then(|v| self.pass(v, operand));
+        }
         for wanted in [VarKind::Input, VarKind::InOut] {
             for (i, arg) in matched.iter().filter(|(i, _)| vars[*i].kind == wanted) {
                 words[*i] = self.argument(&vars[*i], arg);
@@ -155,13 +159,20 @@ impl<'a> Lowering<'_, 'a> {
         }
         let result = self.c.pous[pou].result;
         let site = self.site(span);
-        let body = self.c.body_of(pou);
+        let body = if let Target::Virtual(..) = target { takt_ir::BodyId(0) } else { self.c.body_of(pou) };
         let failed =
             words.iter().any(Option::is_none) || self.c.diagnostics[before..].iter().any(|d| d.severity() == takt_syntax::Severity::Error);
         let mut words: Vec<Local> = words.into_iter().flatten().flatten().collect();
         let value = self.result_of(result, span, |l, dst, place| {
             words.extend(place);
-            l.b.push(Inst::Call { body, args: words, dst, site });
+            match target {
+                Target::Virtual(method, this) => l.b.push(Inst::Virtual { method, this, args: words, dst, site }),
+                Target::Direct(this) => {
+                    words.insert(0, this);
+                    l.b.push(Inst::Call { body, args: words, dst, site });
+                }
+                Target::Plain => l.b.push(Inst::Call { body, args: words, dst, site }),
+            }
         });
         self.assign_outputs(outputs);
         if failed { self.error(span) } else { value }
@@ -204,7 +215,7 @@ impl<'a> Lowering<'_, 'a> {
             ArgKind::NotOut => self.unary(takt_syntax::tree::UnaryOp::Not, value, arg.span),
             _ => value,
         };
-        let target = self.expr(target);
+        let target = self.target(target);
         let value = Operand { span: target.span, ..value };
         self.assign(target, value);
     }
@@ -268,7 +279,7 @@ impl<'a> Lowering<'_, 'a> {
         if operand.is_error() {
             return None;
         }
-        if operand.ty != to {
+        if !self.refers_to(to, operand.ty) {
             let (wanted, found) = (self.type_name(to), self.operand_name(&operand));
             self.report(Code::TypeMismatch, value.span, format!("expected a variable of type `{wanted}`, found {found}"));
             return None;
@@ -278,7 +289,7 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     /// The operand as the parameter's type; strings may keep their own length.
-    fn for_parameter(&mut self, operand: Operand, ty: TypeId) -> Option<Operand> {
+    pub(crate) fn for_parameter(&mut self, operand: Operand, ty: TypeId) -> Option<Operand> {
         let same = operand.ty == ty && !matches!(operand.kind, Kind::Void);
         let operand = if same { operand } else { self.convert(operand, ty) };
         (!operand.is_error()).then_some(operand)
@@ -342,7 +353,7 @@ impl<'a> Lowering<'_, 'a> {
         };
         let same = match (self.c.types.get(ty), self.c.types.get(operand.ty)) {
             (Type::String(wanted), Type::String(found)) | (Type::WString(wanted), Type::WString(found)) => found >= wanted,
-            _ => operand.ty == ty,
+            _ => self.refers_to(ty, operand.ty),
         };
         if !same {
             let (wanted, found) = (self.type_name(ty), self.type_name(operand.ty));
@@ -355,7 +366,7 @@ impl<'a> Lowering<'_, 'a> {
     fn open_argument(&mut self, name: &str, elem: TypeId, dims: u32, operand: &Operand) -> Option<Vec<Local>> {
         match (self.c.types.get(operand.ty).clone(), &operand.kind, operand.fixed) {
             (Type::Array { elem: e, dims: bounds }, Kind::Place(place), None) if e == elem && bounds.len() == dims as usize => {
-                let mut words = vec![self.pointer_to(place, operand.ty)];
+                let mut words = vec![self.pointer_to(place)];
                 for (low, high) in bounds {
                     words.push(self.b.int(low));
                     words.push(self.b.int(high));
@@ -378,7 +389,7 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
-    fn call_instance(&mut self, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
+    pub(crate) fn call_instance(&mut self, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
         if instance.is_error() {
             self.check_arguments(args);
             return instance;
@@ -394,7 +405,7 @@ impl<'a> Lowering<'_, 'a> {
         };
         let Kind::Place(place @ Place::Memory { .. }) = instance.kind.clone() else { return self.error(span) };
         let names: Vec<(&str, Section)> = structure.fields.iter().map(|f| (f.name.as_str(), f.section)).collect();
-        let matched = self.match_arguments(&structure.name, &names, args, span);
+        let matched = self.match_arguments(&structure.name, &names, args);
         for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Input) {
             self.set_input(&place, &structure.fields[*i], arg);
         }
@@ -427,7 +438,7 @@ impl<'a> Lowering<'_, 'a> {
             match desc.cycle {
                 Some(cycle) => {
                     let native = self.c.native(desc.name, cycle);
-                    let this = self.pointer_to(place, instance.ty);
+                    let this = self.pointer_to(place);
                     self.b.push(Inst::Native { native, args: vec![this], dst: None, site });
                 }
                 None => {
@@ -437,6 +448,12 @@ impl<'a> Lowering<'_, 'a> {
             return;
         }
         let Some(pou) = self.c.pou_of_type.get(&instance.ty).copied() else { return };
+        if instance.dynamic && self.c.overridden(pou, "") {
+            let this = self.pointer_to(place);
+            let method = self.c.method_number(Owner::Pou(pou), "");
+            self.b.push(Inst::Virtual { method, this, args: Vec::new(), dst: None, site });
+            return;
+        }
         let body = self.c.body_of(pou);
         let args = match structure.kind {
             StructKind::Program => Vec::new(),
@@ -448,10 +465,8 @@ impl<'a> Lowering<'_, 'a> {
     fn set_input(&mut self, place: &Place, field: &Field, arg: &'a Arg) {
         let Some(value) = &arg.value else { return };
         let target = place.inside(field.offset);
-        if let Type::Reference(_) = self.c.types.get(field.ty) {
-            let operand = self.expr(value);
-            if !operand.is_error() {
-                let pointer = self.address_of(operand, value.span);
+        if let Type::Reference(to) = *self.c.types.get(field.ty) {
+            if let Some(pointer) = self.reference_argument(value, field.ty, to) {
                 let word = self.value(&pointer);
                 self.store(&target, field.ty, word, true, arg.span);
             }
@@ -471,7 +486,7 @@ impl<'a> Lowering<'_, 'a> {
         }
         let words = match *self.c.types.get(field.ty) {
             Type::OpenArray { elem, dims } => self.open_argument(&field.name, elem, dims, &operand),
-            _ => self.variable_argument(&field.name, field.ty, &operand).map(|p| vec![self.pointer_to(&p, operand.ty)]),
+            _ => self.variable_argument(&field.name, field.ty, &operand).map(|p| vec![self.pointer_to(&p)]),
         };
         let Place::Memory { base, offset } = place.inside(field.offset) else { return };
         for (i, src) in words.into_iter().flatten().enumerate() {
@@ -486,7 +501,7 @@ impl<'a> Lowering<'_, 'a> {
         }
         match &operand.kind {
             Kind::Place(place @ (Place::Memory { .. } | Place::Open { .. })) => {
-                let pointer = self.pointer_to(place, operand.ty);
+                let pointer = self.pointer_to(place);
                 let to = match *self.c.types.get(operand.ty) {
                     Type::OpenArray { elem, .. } => elem,
                     _ => operand.ty,
@@ -503,7 +518,7 @@ impl<'a> Lowering<'_, 'a> {
 
     pub(crate) fn call_native(&mut self, desc: &'static FnDesc, args: &'a [Arg], span: Span) -> Operand {
         let names: Vec<(&str, Section)> = desc.params.iter().map(|p| (p.name, Section::Input)).collect();
-        let matched = self.match_arguments(desc.name, &names, args, span);
+        let matched = self.match_arguments(desc.name, &names, args);
         let mut operands: Vec<Option<Operand>> = vec![None; desc.params.len()];
         let mut failed = matched.len() != args.len();
         for (i, arg) in matched {

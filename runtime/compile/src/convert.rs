@@ -19,6 +19,9 @@ impl Lowering<'_, '_> {
         if matches!(a.kind, Kind::Void) {
             return self.mismatch(a, to);
         }
+        if let Some(done) = self.object_conversion(&a, to) {
+            return done;
+        }
         match (self.class(a.ty), self.class(to)) {
             (Class::Int(from), Class::Int(into)) => self.int_to_int(a, from, into, to),
             (Class::Int(from), Class::Real(into)) => {

@@ -1,7 +1,8 @@
 //! Collecting names: which units, types and global lists there are.
 
-use crate::scope::{Declared, GlobalVar, Item, List, Pou, Progress, key};
+use crate::scope::{Declared, GlobalVar, Head, Interface, Item, List, Member, Owner, Pou, PouKind, Progress, key};
 use crate::unit::Compiler;
+use std::collections::HashMap;
 use takt_syntax::tree::{self, TypeKind, Unit, VarKind};
 use takt_syntax::{Code, Span};
 
@@ -18,25 +19,7 @@ impl<'a> Compiler<'a> {
     fn collect_unit(&mut self, file: usize, unit: &'a Unit) {
         let library = file >= self.user_files;
         match unit {
-            Unit::Pou(tree) => {
-                self.refuse_objects(tree);
-                let index = self.pous.len();
-                let actions = tree.actions.iter().map(|a| (key(&a.name.text), None)).collect();
-                self.pous.push(Pou {
-                    tree,
-                    state: Progress::Untouched,
-                    ty: None,
-                    result: None,
-                    vars: Vec::new(),
-                    index: std::collections::HashMap::new(),
-                    late: Vec::new(),
-                    instance: 0,
-                    body: None,
-                    actions,
-                    library,
-                });
-                self.add(library, &tree.name, Item::Pou(index));
-            }
+            Unit::Pou(tree) => self.collect_pou(library, tree),
             Unit::Type(tree) => {
                 let index = self.declared.len();
                 self.declared.push(Declared { tree, state: Progress::Untouched, ty: None });
@@ -54,23 +37,114 @@ impl<'a> Compiler<'a> {
                     self.collect_list_block(library, None, block);
                 }
             }
-            Unit::Interface(interface) => {
-                self.report(Code::NotSupported, interface.name.span, "INTERFACE is not supported yet");
+            Unit::Interface(tree) => {
+                let ty = self.types.intern(takt_ir::Type::Interface(tree.name.text.as_str().into()));
+                let index = self.interfaces.len();
+                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), members: HashMap::new() });
+                self.interface_of_type.insert(ty, index);
+                self.interfaces[index].members = self.collect_members(library, Owner::Interface(index), &tree.methods, &tree.properties);
+                self.add(library, &tree.name, Item::Interface(index));
             }
         }
     }
 
-    fn refuse_objects(&mut self, tree: &'a tree::Pou) {
-        let places = [
-            (tree.extends.as_ref().map(|n| n.span), "EXTENDS"),
-            (tree.implements.first().map(|n| n.span), "IMPLEMENTS"),
-            (tree.methods.first().map(|m| m.name.span), "METHOD"),
-            (tree.properties.first().map(|p| p.name.span), "PROPERTY"),
-        ];
-        for (span, what) in places {
-            if let Some(span) = span {
-                self.report(Code::NotSupported, span, format!("{what} is not supported yet"));
-            }
+    fn collect_pou(&mut self, library: bool, tree: &'a tree::Pou) {
+        let kind = match tree.kind {
+            tree::PouKind::Function => PouKind::Function,
+            tree::PouKind::FunctionBlock => PouKind::FunctionBlock,
+            tree::PouKind::Program => PouKind::Program,
+        };
+        let head = Head {
+            kind,
+            name: &tree.name,
+            modifiers: tree.modifiers,
+            result: tree.result.as_ref(),
+            vars: &tree.vars,
+            body: &tree.body,
+            pragmas: &tree.pragmas,
+            doc: tree.doc.as_deref(),
+        };
+        let index = self.push_pou(head, library, None);
+        let mut members = self.collect_members(library, Owner::Pou(index), &tree.methods, &tree.properties);
+        for action in &tree.actions {
+            let head = Head { kind: PouKind::Action, name: &action.name, body: &action.body, vars: &[], result: None, ..head };
+            let unit = self.push_pou(head, library, Some(Owner::Pou(index)));
+            self.add_member(&mut members, &action.name, Member::Action(unit));
+        }
+        if let (PouKind::Function, Some(name)) = (kind, members.keys().next()) {
+            let message = format!("a FUNCTION has no methods, properties or actions, found `{name}`");
+            self.report(Code::BadStatement, tree.name.span, message);
+        }
+        self.pous[index].members = members;
+        if let Some(base) = &tree.extends {
+            self.extends.push((Owner::Pou(index), base));
+        }
+        self.implements.extend(tree.implements.iter().map(|name| (index, name)));
+        self.add(library, &tree.name, Item::Pou(index));
+    }
+
+    fn push_pou(&mut self, tree: Head<'a>, library: bool, owner: Option<Owner>) -> usize {
+        self.pous.push(Pou {
+            tree,
+            state: Progress::Untouched,
+            ty: None,
+            result: None,
+            vars: Vec::new(),
+            index: HashMap::new(),
+            instance: 0,
+            body: None,
+            start: None,
+            library,
+            owner,
+            members: HashMap::new(),
+            base: None,
+            children: Vec::new(),
+            implements: Vec::new(),
+            class: 0,
+            kept: HashMap::new(),
+        });
+        self.pous.len() - 1
+    }
+
+    /// Methods and properties as units of their own.
+    fn collect_members(
+        &mut self,
+        library: bool,
+        owner: Owner,
+        methods: &'a [tree::Method],
+        properties: &'a [tree::Property],
+    ) -> HashMap<String, Member> {
+        let mut members = HashMap::new();
+        for method in methods {
+            let head = Head {
+                kind: PouKind::Method,
+                name: &method.name,
+                modifiers: method.modifiers,
+                result: method.result.as_ref(),
+                vars: &method.vars,
+                body: &method.body,
+                pragmas: &method.pragmas,
+                doc: method.doc.as_deref(),
+            };
+            let unit = self.push_pou(head, library, Some(owner));
+            self.add_member(&mut members, &method.name, Member::Method(unit));
+        }
+        for property in properties {
+            let mut accessor = |part: &'a Option<(Vec<tree::VarBlock>, Vec<tree::Stmt>)>, result: Option<&'a tree::TypeExpr>| {
+                let (vars, body) = part.as_ref()?;
+                let (name, modifiers) = (&property.name, property.modifiers);
+                let head = Head { kind: PouKind::Method, name, modifiers, result, vars, body, pragmas: &[], doc: None };
+                Some(self.push_pou(head, library, Some(owner)))
+            };
+            let (get, set) = (accessor(&property.get, Some(&property.ty)), accessor(&property.set, None));
+            self.add_member(&mut members, &property.name, Member::Property { get, set });
+        }
+        members
+    }
+
+    fn add_member(&mut self, members: &mut HashMap<String, Member>, name: &tree::Name, member: Member) {
+        if members.insert(key(&name.text), member).is_some() {
+            self.report(Code::DuplicateName, name.span, format!("`{}` is declared twice", name.text));
         }
     }
 

@@ -9,7 +9,9 @@ pub(crate) struct Builder {
     pub(crate) params: u32,
     pub(crate) result: Option<Ty>,
     locals: Vec<Ty>,
-    blocks: Vec<(Vec<Inst>, Option<Term>)>,
+    blocks: Vec<(Vec<Inst>, Option<Term>, Option<BlockId>)>,
+    /// Where faults of the blocks that are made from now on lead.
+    handler: Option<BlockId>,
     at: usize,
     frame: u32,
     frame_high: u32,
@@ -27,7 +29,8 @@ impl Builder {
             params: 0,
             result: None,
             locals: Vec::new(),
-            blocks: vec![(Vec::new(), None)],
+            blocks: vec![(Vec::new(), None, None)],
+            handler: None,
             at: 0,
             frame: 0,
             frame_high: 0,
@@ -54,8 +57,12 @@ impl Builder {
         self.blocks[self.at].0.push(inst);
     }
     pub(crate) fn block(&mut self) -> BlockId {
-        self.blocks.push((Vec::new(), None));
+        self.blocks.push((Vec::new(), None, self.handler));
         BlockId(self.blocks.len() as u32 - 1)
+    }
+    /// Faults of the blocks that are made from now on lead to `handler`; what it was before.
+    pub(crate) fn guard(&mut self, handler: Option<BlockId>) -> Option<BlockId> {
+        std::mem::replace(&mut self.handler, handler)
     }
     pub(crate) fn go_to(&mut self, block: BlockId) {
         self.at = block.0 as usize;
@@ -123,7 +130,7 @@ impl Builder {
         while next < order.len() {
             let term = self.blocks[order[next]].1.get_or_insert(Term::Return(None)).clone();
             next += 1;
-            for target in targets(&term) {
+            for target in targets(&term).into_iter().chain(self.blocks[order[next - 1]].2) {
                 if number[target.0 as usize] == u32::MAX {
                     number[target.0 as usize] = order.len() as u32;
                     order.push(target.0 as usize);
@@ -131,8 +138,9 @@ impl Builder {
             }
         }
         let blocks = order.iter().map(|i| {
-            let (insts, term) = std::mem::take(&mut self.blocks[*i]);
-            Block { insts, term: renumber(term.expect("ended above"), &number) }
+            let (insts, term, handler) = std::mem::take(&mut self.blocks[*i]);
+            let handler = handler.map(|block| BlockId(number[block.0 as usize]));
+            Block { insts, term: renumber(term.expect("ended above"), &number), handler }
         });
         Body {
             blocks: blocks.collect(),

@@ -2,13 +2,14 @@
 
 use crate::constant::Value;
 use crate::emit::Builder;
+use crate::object::Bound;
 use crate::place::Place;
-use crate::scope::{Item, Storage, key};
+use crate::scope::{Item, Owner, PouKind, Storage, key};
 use crate::types::{elementary, nearest};
 use crate::unit::Compiler;
 use takt_abi::{Elem, FnDesc, Section};
 use takt_ir::{Base, BlockId, Body, BodyId, Const, Local, SiteId, StructKind, Type, TypeId};
-use takt_syntax::tree::{Expr, ExprKind, Literal, LiteralValue, Name, PouKind};
+use takt_syntax::tree::{Expr, ExprKind, Literal, LiteralValue, Name, VarKind};
 use takt_syntax::{Code, Diagnostic, Span};
 
 /// What an expression came to.
@@ -24,6 +25,8 @@ pub(crate) enum Kind {
     Temp(Local),
     /// In memory or in a variable's register.
     Place(Place),
+    /// A property that is about to be written.
+    Property(Box<Bound>),
 }
 
 /// An expression's value or place with its type.
@@ -38,6 +41,8 @@ pub(crate) struct Operand {
     pub(crate) exact: bool,
     /// Why it must not be written.
     pub(crate) fixed: Option<&'static str>,
+    /// The instance may be of a type that extends `ty`: it was reached through a pointer, reference, VAR_IN_OUT or THIS.
+    pub(crate) dynamic: bool,
 }
 
 impl Operand {
@@ -57,9 +62,17 @@ pub(crate) enum Thing {
     Library,
     Function(usize),
     Native(&'static FnDesc),
-    /// An action and the instance it runs on.
-    Action(usize, usize, Operand),
+    /// A method, property or action and the instance it runs on.
+    Member(Box<Bound>),
     Error,
+}
+
+/// A unit whose names are seen, the innermost first.
+#[derive(Debug)]
+pub(crate) struct Level {
+    pub(crate) pou: usize,
+    /// Where its variables are if the body has places of its own for them, parallel to its table.
+    pub(crate) storage: Option<Vec<Storage>>,
 }
 
 /// A loop that EXIT and CONTINUE refer to.
@@ -75,13 +88,15 @@ pub(crate) struct Lowering<'c, 'a> {
     pub(crate) b: Builder,
     pub(crate) id: BodyId,
     pub(crate) pou: Option<usize>,
-    /// Where the unit's variables are, parallel to its table.
-    pub(crate) storage: Vec<Storage>,
+    /// The unit, the block that it belongs to, and what that extends.
+    pub(crate) levels: Vec<Level>,
     /// Address of the instance.
     pub(crate) this: Option<Local>,
     /// Result variable of a function.
     pub(crate) result: Option<(TypeId, Storage)>,
     pub(crate) loops: Vec<Loop>,
+    /// __TRY statements under way: loops around them, and what __FINALLY says.
+    pub(crate) protected: Vec<(usize, &'a [takt_syntax::tree::Stmt])>,
     pub(crate) labels: std::collections::HashMap<String, (BlockId, bool, Span)>,
     pub(crate) scratch: bool,
 }
@@ -95,10 +110,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
             b,
             id,
             pou: None,
-            storage: Vec::new(),
+            levels: Vec::new(),
             this: None,
             result: None,
             loops: Vec::new(),
+            protected: Vec::new(),
             labels: Default::default(),
             scratch: false,
         };
@@ -114,10 +130,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
             b,
             id: BodyId(0),
             pou: None,
-            storage: Vec::new(),
+            levels: Vec::new(),
             this: None,
             result: None,
             loops: Vec::new(),
+            protected: Vec::new(),
             labels: Default::default(),
             scratch: true,
         };
@@ -128,19 +145,65 @@ impl<'c, 'a> Lowering<'c, 'a> {
     /// Looks names up in this unit from now on; a program's variables are at its instance.
     pub(crate) fn enter(&mut self, pou: Option<usize>) {
         self.pou = pou;
-        let Some(pou) = pou.map(|p| &self.c.pous[p]) else {
-            self.storage.clear();
-            return;
+        self.levels.clear();
+        let Some(pou) = pou else { return };
+        let own = match self.c.pous[pou].owner {
+            Some(Owner::Pou(owner)) => {
+                self.levels.push(Level { pou, storage: None });
+                owner
+            }
+            _ => pou,
         };
-        let program = pou.tree.kind == PouKind::Program;
-        self.storage = pou
-            .vars
-            .iter()
-            .map(|v| match &v.storage {
-                Storage::This(offset) if program => Storage::Image(pou.instance + offset),
-                other => other.clone(),
-            })
-            .collect();
+        self.levels.extend(self.c.bases(own).map(|pou| Level { pou, storage: None }));
+    }
+
+    /// The block or program whose instance the body runs on.
+    pub(crate) fn block(&self) -> Option<usize> {
+        let pou = self.pou?;
+        match (self.c.pous[pou].owner, self.c.pous[pou].tree.kind) {
+            (Some(Owner::Pou(owner)), _) => Some(owner),
+            (_, PouKind::FunctionBlock | PouKind::Program) => Some(pou),
+            _ => None,
+        }
+    }
+
+    /// Places of the innermost unit's variables, to be changed.
+    pub(crate) fn own_storage(&mut self) -> &mut Vec<Storage> {
+        self.level_storage(0)
+    }
+
+    /// Places of the variables of a level, to be changed.
+    pub(crate) fn level_storage(&mut self, level: usize) -> &mut Vec<Storage> {
+        let vars = &self.c.pous[self.levels[level].pou].vars;
+        self.levels[level].storage.get_or_insert_with(|| vars.iter().map(|v| v.storage.clone()).collect())
+    }
+
+    /// Where a variable is.
+    pub(crate) fn storage_of(&self, level: usize, i: usize) -> Storage {
+        let Level { pou, storage } = &self.levels[level];
+        let pou = &self.c.pous[*pou];
+        let found = storage.as_ref().map_or_else(|| &pou.vars[i].storage, |s| s.get(i).unwrap_or(&Storage::Nowhere));
+        match found {
+            Storage::This(offset) if pou.tree.kind == PouKind::Program || self.in_program() => {
+                Storage::Image(self.block().map_or(pou.instance, |c| self.c.pous[c].instance) + offset)
+            }
+            other => other.clone(),
+        }
+    }
+
+    fn in_program(&self) -> bool {
+        self.block().is_some_and(|c| self.c.pous[c].tree.kind == PouKind::Program)
+    }
+
+    /// The level and number of a variable that is seen here.
+    pub(crate) fn local(&self, wanted: &str) -> Option<(usize, usize)> {
+        self.levels.iter().enumerate().find_map(|(level, l)| {
+            let pou = &self.c.pous[l.pou];
+            let i = *pou.index.get(wanted)?;
+            // What lives for one call is seen by that call only.
+            let elsewhere = level > 0 && l.storage.is_none() && pou.vars[i].kind == VarKind::Temp;
+            (!elsewhere).then_some((level, i))
+        })
     }
 
     pub(crate) fn finish(self) -> Body {
@@ -157,19 +220,19 @@ impl<'c, 'a> Lowering<'c, 'a> {
 
     pub(crate) fn error(&mut self, span: Span) -> Operand {
         let ty = self.c.error_type();
-        Operand { ty, kind: Kind::Error, span, flex: false, exact: true, fixed: None }
+        Operand { ty, kind: Kind::Error, span, flex: false, exact: true, fixed: None, dynamic: false }
     }
     pub(crate) fn constant(&self, value: Value, ty: TypeId, span: Span) -> Operand {
-        Operand { ty, kind: Kind::Const(value), span, flex: false, exact: true, fixed: Some("a constant") }
+        Operand { ty, kind: Kind::Const(value), span, flex: false, exact: true, fixed: Some("a constant"), dynamic: false }
     }
     pub(crate) fn temp(&self, local: Local, ty: TypeId, span: Span) -> Operand {
-        Operand { ty, kind: Kind::Temp(local), span, flex: false, exact: false, fixed: Some("an expression") }
+        Operand { ty, kind: Kind::Temp(local), span, flex: false, exact: false, fixed: Some("an expression"), dynamic: false }
     }
     pub(crate) fn exact(&self, local: Local, ty: TypeId, span: Span) -> Operand {
         Operand { exact: true, ..self.temp(local, ty, span) }
     }
     pub(crate) fn at(&self, place: Place, ty: TypeId, span: Span) -> Operand {
-        Operand { ty, kind: Kind::Place(place), span, flex: false, exact: true, fixed: None }
+        Operand { ty, kind: Kind::Place(place), span, flex: false, exact: true, fixed: None, dynamic: false }
     }
     pub(crate) fn bool_type(&mut self) -> TypeId {
         self.c.elem(Elem::Bool)
@@ -187,18 +250,21 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 self.unary(*op, a, e.span)
             }
             ExprKind::Binary(op, a, b) => self.binary_expr(*op, a, b, e.span),
-            ExprKind::Call(callee, args) => self.call(callee, args, e.span),
+            ExprKind::Call(callee, args) => {
+                let result = self.call(callee, args, e.span);
+                self.follow(result)
+            }
             ExprKind::Assign(target, value) => {
-                let target = self.expr(target);
+                let target = self.target(target);
                 let value = self.expr(value);
                 self.assign(target.clone(), value);
-                target
+                self.read_back(target)
             }
             ExprKind::Error => self.error(e.span),
             _ => match self.thing(e) {
                 Thing::Value(operand) => operand,
                 Thing::Error => self.error(e.span),
-                Thing::Function(_) | Thing::Native(_) | Thing::Action(..) => {
+                Thing::Function(_) | Thing::Native(_) | Thing::Member(_) => {
                     self.report(Code::BadStatement, e.span, "a call needs brackets").help = Some("write `name()`".into());
                     self.error(e.span)
                 }
@@ -215,10 +281,26 @@ impl<'c, 'a> Lowering<'c, 'a> {
         }
     }
 
-    /// What a path means: a value, or something that only a member or a call makes one of. References are followed.
+    /// Lowers what is about to be written: a property stays one.
+    pub(crate) fn target(&mut self, e: &'a Expr) -> Operand {
+        match &e.kind {
+            ExprKind::Name(_) | ExprKind::Member(..) => match self.thing_raw(e) {
+                Thing::Member(bound) => self.property_target(*bound, e.span),
+                Thing::Value(operand) => self.follow(operand),
+                _ => self.expr(e),
+            },
+            _ => self.expr(e),
+        }
+    }
+
+    /// What a path means: a value, or something that only a member or a call makes one of. References are followed, properties read.
     pub(crate) fn thing(&mut self, e: &'a Expr) -> Thing {
         match self.thing_raw(e) {
             Thing::Value(operand) => Thing::Value(self.follow(operand)),
+            Thing::Member(bound) if bound.is_property() => {
+                let value = self.get_property(*bound, e.span);
+                Thing::Value(self.follow(value))
+            }
             other => other,
         }
     }
@@ -229,10 +311,10 @@ impl<'c, 'a> Lowering<'c, 'a> {
         let span = operand.span;
         let pointer = self.value(&operand);
         let place = self.deref(pointer, to, span);
-        self.at(place, to, span)
+        Operand { dynamic: true, ..self.at(place, to, span) }
     }
 
-    /// As [`Lowering::thing`], but a REFERENCE stays one.
+    /// As [`Lowering::thing`], but a REFERENCE stays one, and a property is not read.
     pub(crate) fn thing_raw(&mut self, e: &'a Expr) -> Thing {
         match &e.kind {
             ExprKind::Name(name) => self.name(name, e.span),
@@ -251,9 +333,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
             ExprKind::Part(base, part) => Thing::Value(self.part(base, *part, e.span)),
             ExprKind::This => self.this_thing(e.span),
             ExprKind::Super => {
-                self.report(Code::NotSupported, e.span, "SUPER is not supported yet");
+                self.report(Code::BadStatement, e.span, "SUPER stands before `^`").help =
+                    Some("write `SUPER^.Method()` or `SUPER^()`".into());
                 Thing::Error
             }
+            ExprKind::Call(callee, args) => Thing::Value(self.call(callee, args, e.span)),
             ExprKind::Direct(direct) => {
                 self.report(Code::NotSupported, direct.span, "a direct address is not supported in an expression").help =
                     Some("declare a variable in VAR_GLOBAL and wire it in takt.toml".into());
@@ -265,10 +349,10 @@ impl<'c, 'a> Lowering<'c, 'a> {
     }
 
     fn this_thing(&mut self, span: Span) -> Thing {
-        match (self.this, self.pou.and_then(|p| self.c.pous[p].ty)) {
+        match (self.this, self.block().and_then(|p| self.c.pous[p].ty)) {
             (Some(this), Some(ty)) => {
                 let place = Place::Memory { base: Base::Local(this), offset: 0 };
-                let pointer = self.pointer_to(&place, ty);
+                let pointer = self.pointer_to(&place);
                 let ty = self.c.types.intern(Type::Pointer(ty));
                 Thing::Value(self.exact(pointer, ty, span))
             }
@@ -279,44 +363,44 @@ impl<'c, 'a> Lowering<'c, 'a> {
         }
     }
 
-    fn name(&mut self, name: &str, span: Span) -> Thing {
-        if let Some(pou) = self.pou {
-            let wanted = key(name);
-            if let Some(i) = self.c.pous[pou].index.get(&wanted).copied() {
-                return Thing::Value(self.variable(pou, i, span));
-            }
-            if let Some(action) = self.c.pous[pou].actions.iter().position(|(n, _)| *n == wanted) {
-                let Some(instance) = self.own_instance(pou, span) else { return Thing::Error };
-                return Thing::Action(pou, action, instance);
-            }
-            if let (Some((ty, storage)), true) = (&self.result, key(&self.c.pous[pou].tree.name.text) == wanted) {
-                let (ty, storage) = (*ty, storage.clone());
-                return Thing::Value(self.stored(&storage, ty, span));
-            }
+    pub(crate) fn name(&mut self, name: &str, span: Span) -> Thing {
+        let Some(pou) = self.pou else { return self.global_thing(name, span) };
+        let wanted = key(name);
+        if let Some((level, i)) = self.local(&wanted)
+            && (level == 0 || !self.is_result(pou, &wanted))
+        {
+            return Thing::Value(self.variable(level, i, span));
         }
-        self.global_thing(name, span)
+        if let (Some((ty, storage)), true) = (&self.result, self.is_result(pou, &wanted)) {
+            let (ty, storage) = (*ty, storage.clone());
+            return Thing::Value(self.stored(&storage, ty, span));
+        }
+        match self.own_member(&wanted, span) {
+            Some(thing) => thing,
+            None => self.global_thing(name, span),
+        }
     }
 
-    fn own_instance(&mut self, pou: usize, span: Span) -> Option<Operand> {
-        let ty = self.c.pous[pou].ty?;
-        let base = match self.this {
-            Some(this) => Place::Memory { base: Base::Local(this), offset: 0 },
-            None => Place::Memory { base: Base::Image, offset: self.c.pous[pou].instance },
-        };
-        Some(self.at(base, ty, span))
+    /// Whether a name is that of the unit's result.
+    pub(crate) fn is_result(&self, pou: usize, wanted: &str) -> bool {
+        self.result.is_some() && key(&self.c.pous[pou].tree.name.text) == wanted
     }
 
-    fn variable(&mut self, pou: usize, i: usize, span: Span) -> Operand {
-        let v = &self.c.pous[pou].vars[i];
-        let (ty, constant) = (v.ty, v.constant);
+    fn variable(&mut self, level: usize, i: usize, span: Span) -> Operand {
+        let v = &self.c.pous[self.levels[level].pou].vars[i];
+        let (ty, constant, in_out) = (v.ty, v.constant, v.kind == VarKind::InOut);
         if let Some(value) = v.value.clone() {
             return self.constant(value, ty, span);
         }
         if *self.c.types.get(ty) == Type::Error {
             return self.error(span);
         }
-        let storage = self.storage.get(i).cloned().unwrap_or(Storage::Nowhere);
-        let mut operand = self.stored(&storage, ty, span);
+        let storage = self.storage_of(level, i);
+        let mut operand = match (in_out, &storage) {
+            (true, Storage::This(_) | Storage::Image(_)) => self.follow_in_out(&storage, ty, span),
+            _ => self.stored(&storage, ty, span),
+        };
+        operand.dynamic = in_out;
         if constant {
             operand.fixed = Some("a constant");
         }
@@ -355,13 +439,13 @@ impl<'c, 'a> Lowering<'c, 'a> {
     }
 
     fn suggest(&self, name: &str) -> Option<String> {
-        let local = self.pou.and_then(|p| nearest(&key(name), self.c.pous[p].vars.iter().map(|v| key(&v.name))));
-        match (local, self.pou) {
-            (Some(found), Some(p)) => {
-                let spelled = self.c.pous[p].vars.iter().find(|v| key(&v.name) == found).map_or(found, |v| v.name.clone());
+        let seen = || self.levels.iter().flat_map(|l| &self.c.pous[l.pou].vars);
+        match nearest(&key(name), seen().map(|v| key(&v.name))) {
+            Some(found) => {
+                let spelled = seen().find(|v| key(&v.name) == found).map_or(found, |v| v.name.clone());
                 Some(format!("did you mean `{spelled}`?"))
             }
-            _ => self.c.suggest(name, false),
+            None => self.c.suggest(name, false),
         }
     }
 
@@ -373,6 +457,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 let ty = self.c.declared[i].ty;
                 ty.map_or(Thing::Error, Thing::Type)
             }
+            Item::Interface(i) => Thing::Type(self.c.interfaces[i].ty),
             Item::Ready(ty) | Item::NativeBlock(ty) => Thing::Type(ty),
             Item::NativeFunction(desc) => Thing::Native(desc),
             Item::List(i) => Thing::List(i),
@@ -398,8 +483,8 @@ impl<'c, 'a> Lowering<'c, 'a> {
     fn pou_thing(&mut self, i: usize, span: Span) -> Thing {
         self.c.resolve_pou(i, span);
         match self.c.pous[i].tree.kind {
-            PouKind::Function => Thing::Function(i),
             PouKind::FunctionBlock => Thing::Type(self.c.pou_type(i)),
+            PouKind::Function | PouKind::Method | PouKind::Action => Thing::Function(i),
             PouKind::Program => {
                 let ty = self.c.pou_type(i);
                 let offset = self.c.pous[i].instance.max(takt_ir::NULL_ZONE);
@@ -449,6 +534,14 @@ impl<'c, 'a> Lowering<'c, 'a> {
     }
 
     fn member(&mut self, base: &'a Expr, member: &Name, span: Span) -> Thing {
+        if let ExprKind::Deref(inner) = &base.kind
+            && inner.kind == ExprKind::Super
+        {
+            return match self.super_instance(base.span) {
+                Some(operand) => self.field(operand, member, span),
+                None => Thing::Error,
+            };
+        }
         match self.thing(base) {
             Thing::Value(operand) => self.field(operand, member, span),
             Thing::List(list) => match self.c.lists[list].vars.get(&key(&member.text)).copied() {
@@ -471,7 +564,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 }
             },
             Thing::Error => Thing::Error,
-            Thing::Function(_) | Thing::Native(_) | Thing::Action(..) => {
+            Thing::Function(_) | Thing::Native(_) | Thing::Member(_) => {
                 self.report(Code::UnknownMember, member.span, format!("a function has no member `{}`", member.text));
                 Thing::Error
             }
@@ -483,23 +576,25 @@ impl<'c, 'a> Lowering<'c, 'a> {
             return Thing::Error;
         }
         let wanted = key(&member.text);
+        if let Some(thing) = self.member_thing(&operand, &wanted, member.span) {
+            return thing;
+        }
         let Type::Struct(structure) = self.c.types.get(operand.ty) else {
             return self.no_member(&operand, member);
         };
         let (kind, found) = (structure.kind, structure.fields.iter().find(|f| key(&f.name) == wanted).cloned());
-        if let Some(pou) = self.c.pou_of_type.get(&operand.ty).copied() {
-            if let Some(action) = self.c.pous[pou].actions.iter().position(|(n, _)| *n == wanted) {
-                return Thing::Action(pou, action, operand);
-            }
-            let i = self.c.pous[pou].index.get(&wanted).copied();
-            if let Some(value) = i.and_then(|i| self.c.pous[pou].vars[i].value.clone()) {
-                let ty = self.c.pous[pou].vars[i.expect("found")].ty;
-                return Thing::Value(self.constant(value, ty, span));
-            }
+        let unit = self.c.pou_of_type.get(&operand.ty).copied();
+        let constant = unit.and_then(|unit| {
+            let var = self.c.bases(unit).find_map(|b| self.c.pous[b].index.get(&wanted).map(|i| &self.c.pous[b].vars[*i]))?;
+            Some((var.value.clone()?, var.ty))
+        });
+        if let Some((value, ty)) = constant {
+            return Thing::Value(self.constant(value, ty, span));
         }
         let Some(field) = found else { return self.no_member(&operand, member) };
-        // A block sees all of its own type: `THIS^.x`.
-        let foreign = kind == StructKind::Block && self.c.pou_of_type.get(&operand.ty).copied() != self.pou;
+        // A block sees all of its own type and of what it extends: `THIS^.x`.
+        let related = |unit: usize| self.block().is_some_and(|c| self.c.is_a(c, Owner::Pou(unit)) || self.c.is_a(unit, Owner::Pou(c)));
+        let foreign = kind == StructKind::Block && !unit.is_some_and(related);
         if foreign && matches!(field.section, Section::State | Section::InOut) {
             let what = if field.section == Section::InOut { "VAR_IN_OUT" } else { "VAR" };
             self.report(
@@ -513,6 +608,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
             return Thing::Error;
         }
         let Kind::Place(place) = operand.kind else { return Thing::Error };
+        if field.section == Section::InOut
+            && let Place::Memory { base, offset } = place.inside(field.offset)
+        {
+            return Thing::Value(Operand { dynamic: true, ..self.in_out_at(base, offset, field.ty, span) });
+        }
         let mut value = self.at(place.inside(field.offset), field.ty, span);
         value.fixed = operand.fixed;
         if foreign && field.section == Section::Output {
@@ -607,7 +707,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 self.b.constant(value)
             }
             Kind::Place(place) => self.load(place, operand.ty, operand.span),
-            Kind::Error | Kind::Void => self.b.int(0),
+            Kind::Error | Kind::Void | Kind::Property(_) => self.b.int(0),
         }
     }
 }

@@ -1,11 +1,11 @@
 //! The image: where globals, programs, statics and stacks lie, and its first bytes.
 
 use crate::initial::{Late, Target};
-use crate::scope::{Storage, key};
+use crate::scope::{PouKind, Storage, key};
 use crate::unit::Compiler;
 use takt_abi::Section;
 use takt_ir::{Global, ResourceInstance, StructKind, Type, TypeId};
-use takt_syntax::tree::{PouKind, VarKind};
+use takt_syntax::tree::VarKind;
 use takt_syntax::{Code, Span};
 
 /// Bytes that an application may have, stacks included.
@@ -66,7 +66,7 @@ impl<'a> Compiler<'a> {
             doc: var.decl.doc.clone().unwrap_or_default(),
         });
         self.fill_variable(&var, offset, None);
-        self.resources_in(var.ty, offset);
+        self.note_instances(var.ty, offset);
     }
 
     fn fill_variable(&mut self, var: &crate::scope::Variable<'a>, offset: u32, pou: Option<usize>) {
@@ -75,7 +75,7 @@ impl<'a> Compiler<'a> {
         let mut late = Vec::new();
         self.fill(var.decl, var.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
         self.write(offset, &bytes);
-        self.late.extend(late.into_iter().map(|(at, ty, expr)| Late { offset: offset + at, ty, expr, pou }));
+        self.late.extend(late.into_iter().map(|late| (pou, Late { offset: offset + late.offset, ..late })));
     }
 
     /// Writes initial bytes; zeros at the end of the image cost nothing.
@@ -98,7 +98,7 @@ impl<'a> Compiler<'a> {
             let offset = self.take(size, align, var.span);
             self.pous[i].vars[v].storage = Storage::Image(offset);
             self.fill_variable(&var, offset, Some(i));
-            self.resources_in(var.ty, offset);
+            self.note_instances(var.ty, offset);
         }
         if self.pous[i].tree.kind == PouKind::Program {
             self.lay_out_program(i);
@@ -114,14 +114,69 @@ impl<'a> Compiler<'a> {
         if let Some(bytes) = self.type_bytes(ty) {
             self.write(offset, &bytes);
         }
-        let late = self.pous[i].late.clone();
-        self.late.extend(late.into_iter().map(|(at, ty, expr)| Late { offset: offset + at, ty, expr, pou: Some(i) }));
-        let doc = tree.doc.clone().unwrap_or_default();
+        let late = self.type_late.get(&ty).cloned().unwrap_or_default();
+        self.late.extend(late.iter().map(|late| (Some(i), Late { offset: offset + late.offset, ..*late })));
+        let doc = tree.doc.unwrap_or_default().into();
         self.program.globals.push(Global { name: tree.name.text.clone(), bare: true, ty, offset, constant: false, doc });
-        self.resources_in(ty, offset);
+        self.note_instances(ty, offset);
     }
 
-    /// Notes the instances with resources inside of a variable.
+    /// Notes the instances with resources and those of classes inside of a variable.
+    fn note_instances(&mut self, ty: TypeId, offset: u32) {
+        self.resources_in(ty, offset);
+        self.instances_in(ty, offset, &mut |c, class, offset, count| {
+            c.program.instances.push(takt_ir::Instances { offset, class, count });
+        });
+    }
+
+    /// Finds the instances of classes inside of a variable: class, offset of the first, number.
+    pub(crate) fn instances_in(&mut self, ty: TypeId, offset: u32, found: &mut dyn FnMut(&mut Self, u32, u32, u32)) {
+        let class = |c: &Self, ty: TypeId| c.pou_of_type.get(&ty).map_or(0, |pou| c.pous[*pou].class);
+        match self.types.get(ty).clone() {
+            Type::Array { elem, .. } if self.has_classes(elem) => {
+                let stride = self.types.size(elem).max(1);
+                let count = self.types.size(ty) / stride;
+                let simple = class(self, elem);
+                if simple != 0 {
+                    found(self, simple, offset, count);
+                }
+                if simple == 0 || self.has_class_members(elem) {
+                    for n in 0..count {
+                        self.instances_inside(elem, offset + n * stride, found);
+                    }
+                }
+            }
+            Type::Struct(_) => {
+                let own = class(self, ty);
+                if own != 0 {
+                    found(self, own, offset, 1);
+                }
+                self.instances_inside(ty, offset, found);
+            }
+            _ => {}
+        }
+    }
+
+    fn instances_inside(&mut self, ty: TypeId, offset: u32, found: &mut dyn FnMut(&mut Self, u32, u32, u32)) {
+        let Type::Struct(s) = self.types.get(ty).clone() else { return self.instances_in(ty, offset, found) };
+        for field in s.fields.iter().filter(|f| s.kind != StructKind::Union && f.section != Section::InOut) {
+            self.instances_in(field.ty, offset + field.offset, found);
+        }
+    }
+
+    pub(crate) fn has_classes(&self, ty: TypeId) -> bool {
+        match self.types.get(ty) {
+            Type::Array { elem, .. } => self.has_classes(*elem),
+            Type::Struct(_) => self.pou_of_type.get(&ty).is_some_and(|pou| self.pous[*pou].class != 0) || self.has_class_members(ty),
+            _ => false,
+        }
+    }
+
+    fn has_class_members(&self, ty: TypeId) -> bool {
+        let Type::Struct(s) = self.types.get(ty) else { return false };
+        s.kind != StructKind::Union && s.fields.iter().any(|f| f.section != Section::InOut && self.has_classes(f.ty))
+    }
+
     fn resources_in(&mut self, ty: TypeId, offset: u32) {
         if let Some(make) = self.native_blocks.get(&ty).and_then(|desc| desc.resource) {
             self.program.resources.push(ResourceInstance { offset, make });
@@ -144,7 +199,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn may_own(&self, ty: TypeId) -> bool {
+    pub(crate) fn may_own(&self, ty: TypeId) -> bool {
         match self.types.get(ty) {
             Type::Array { elem, .. } => self.may_own(*elem),
             Type::Struct(s) => {

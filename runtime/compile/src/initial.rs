@@ -9,21 +9,29 @@ use takt_ir::{Base, StructKind, Type, TypeId};
 use takt_syntax::tree::{self, Init, InitItem};
 use takt_syntax::{Code, Span};
 
-/// An initial value that is set by code.
+/// What is set by code at the start.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Late<'a> {
     pub(crate) offset: u32,
     pub(crate) ty: TypeId,
-    pub(crate) expr: &'a tree::Expr,
-    pub(crate) pou: Option<usize>,
+    pub(crate) what: What<'a>,
 }
 
-/// Initial bytes being written, and what cannot be bytes: offset, type, expression.
+/// What is set by code.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum What<'a> {
+    /// To the value of an expression.
+    Expr(&'a tree::Expr),
+    /// By the instances themselves: members, FB_Init with the arguments of the declaration, initial values of the declaration.
+    Construct(&'a tree::VarDecl),
+}
+
+/// Initial bytes being written, and what cannot be bytes.
 pub(crate) struct Target<'a, 'b> {
     /// The unit whose names the expressions may use.
     pub(crate) pou: Option<usize>,
     pub(crate) bytes: &'b mut [u8],
-    pub(crate) late: &'b mut Vec<(u32, TypeId, &'a tree::Expr)>,
+    pub(crate) late: &'b mut Vec<Late<'a>>,
 }
 
 /// What is left of an array: the next element's offset, the end, bytes per element.
@@ -38,6 +46,15 @@ pub(crate) enum Known {
     Value(Value),
     Dynamic,
     Error,
+}
+
+impl Late<'_> {
+    fn span(&self) -> Span {
+        match self.what {
+            What::Expr(expr) => expr.span,
+            What::Construct(decl) => decl.name.span,
+        }
+    }
 }
 
 impl<'a> Compiler<'a> {
@@ -76,7 +93,10 @@ impl<'a> Compiler<'a> {
     /// The value of a scalar or string CONSTANT.
     pub(crate) fn constant_of(&mut self, decl: &'a tree::VarDecl, ty: TypeId, pou: Option<usize>) -> Option<Value> {
         let Some(Init::Expr(expr)) = &decl.init else { return None };
-        if matches!(self.types.get(ty), Type::Array { .. } | Type::Struct(_) | Type::Error | Type::Pointer(_) | Type::Reference(_)) {
+        if matches!(
+            self.types.get(ty),
+            Type::Array { .. } | Type::Struct(_) | Type::Error | Type::Pointer(_) | Type::Reference(_) | Type::Interface(_)
+        ) {
             return None;
         }
         match self.known(expr, pou, Some(ty)).0 {
@@ -123,6 +143,9 @@ impl<'a> Compiler<'a> {
         if let Some(init) = decl.init.as_ref().or(alias) {
             self.overlay(init, ty, at, target);
         }
+        if self.constructs(ty) {
+            target.late.push(Late { offset: at, ty, what: What::Construct(decl) });
+        }
     }
 
     /// The initial value that a type alias gives its variables.
@@ -150,12 +173,12 @@ impl<'a> Compiler<'a> {
     /// False if the expression is wrong.
     fn overlay_expr(&mut self, expr: &'a tree::Expr, ty: TypeId, at: u32, target: &mut Target<'a, '_>) -> bool {
         if let Type::Reference(_) = self.types.get(ty) {
-            target.late.push((at, ty, expr));
+            target.late.push(Late { offset: at, ty, what: What::Expr(expr) });
             return true;
         }
         match self.known(expr, target.pou, Some(ty)).0 {
             Known::Value(value) => self.store_value(&value, ty, &mut target.bytes[at as usize..]),
-            Known::Dynamic => target.late.push((at, ty, expr)),
+            Known::Dynamic => target.late.push(Late { offset: at, ty, what: What::Expr(expr) }),
             Known::Error => return false,
         }
         true
@@ -264,7 +287,9 @@ impl<'a> Compiler<'a> {
         match (self.types.get(ty), value) {
             (Type::Elem(e) | Type::Subrange { base: e, .. }, v) => store(v, *e, bytes),
             (Type::Enum(e), v) => store(v, e.base, bytes),
-            (Type::Pointer(_) | Type::Reference(_), Value::Int(v)) => bytes[..8].copy_from_slice(&(*v as u64).to_le_bytes()),
+            (Type::Pointer(_) | Type::Reference(_) | Type::Interface(_), Value::Int(v)) => {
+                bytes[..8].copy_from_slice(&(*v as u64).to_le_bytes())
+            }
             (Type::String(n), Value::Text(text)) => {
                 let len = text.len().min(*n as usize);
                 bytes[..=*n as usize].fill(0);
@@ -283,12 +308,13 @@ impl<'a> Compiler<'a> {
     /// The body that sets what is not bytes.
     pub(crate) fn initialise(&mut self) {
         let late = std::mem::take(&mut self.late);
-        let Some(first) = late.first() else { return };
-        let id = self.reserve("(initial values)", first.expr.span);
-        let mut lowering = Lowering::new(self, id, "(initial values)", None, first.expr.span);
-        for Late { offset, ty, expr, pou } in late {
+        let Some((_, first)) = late.first() else { return };
+        let span = first.span();
+        let id = self.reserve("(initial values)", span);
+        let mut lowering = Lowering::new(self, id, "(initial values)", None, span);
+        for (pou, late) in late {
             lowering.enter(pou);
-            lowering.set_initial(Base::Image, offset, ty, expr);
+            lowering.set_late(Base::Image, 0, late);
         }
         let body = lowering.finish();
         self.program.bodies[id.0 as usize] = body;

@@ -9,17 +9,22 @@
 
 mod body;
 mod call;
+mod class;
 mod constant;
+mod construct;
 mod convert;
 mod declare;
 mod emit;
 mod expression;
+mod heap;
 mod image;
 mod initial;
 mod intrinsic;
 mod library;
+mod object;
 mod operator;
 mod place;
+mod protect;
 mod recursion;
 mod scope;
 mod sites;
@@ -49,6 +54,8 @@ pub struct Options {
     pub iec_arithmetic: bool,
     /// Implicit conversions that may lose information are errors.
     pub strict: bool,
+    /// Bytes of the heap of `__NEW` (rounded up to a power of two); 0 means 1 MiB. A program that does not use it has none.
+    pub heap: u32,
     /// BOOL expressions in global scope (`--until`, conditions of the manifest). Their [`FileId`]s follow those of the sources.
     pub conditions: Vec<Source>,
 }

@@ -90,7 +90,7 @@ impl<'a> Lowering<'_, 'a> {
             Type::Enum(e) => Class::Int(e.base),
             Type::String(_) => Class::Text,
             Type::WString(_) => Class::Wide,
-            Type::Pointer(_) => Class::Pointer,
+            Type::Pointer(_) | Type::Interface(_) => Class::Pointer,
             _ => Class::Other,
         }
     }

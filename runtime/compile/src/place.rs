@@ -52,7 +52,7 @@ impl<'a> Lowering<'_, 'a> {
         match self.c.types.get(ty) {
             Type::Elem(e) | Type::Subrange { base: e, .. } => Some(*e),
             Type::Enum(e) => Some(e.base),
-            Type::Pointer(_) | Type::Reference(_) => Some(Elem::Lword),
+            Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) => Some(Elem::Lword),
             _ => None,
         }
     }
@@ -143,7 +143,7 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     /// The offset of a place in the image, as ADR gives it.
-    pub(crate) fn pointer_to(&mut self, place: &Place, _ty: TypeId) -> Local {
+    pub(crate) fn pointer_to(&mut self, place: &Place) -> Local {
         match place {
             Place::Memory { base, offset } => {
                 let dst = self.b.local(Ty::I64);
@@ -164,6 +164,11 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     pub(crate) fn deref_expr(&mut self, base: &'a Expr, span: Span) -> Operand {
+        match crate::object::is_self(base) {
+            Some(true) => return self.this_instance(span),
+            Some(false) => return self.super_instance(span).unwrap_or_else(|| self.error(span)),
+            None => {}
+        }
         let operand = self.expr(base);
         if operand.is_error() {
             return operand;
@@ -175,7 +180,7 @@ impl<'a> Lowering<'_, 'a> {
         };
         let pointer = self.value(&operand);
         let place = self.deref(pointer, to, span);
-        self.at(place, to, span)
+        Operand { dynamic: true, ..self.at(place, to, span) }
     }
 
     pub(crate) fn index(&mut self, base: &'a Expr, indices: &'a [Expr], span: Span) -> Operand {
@@ -290,7 +295,7 @@ impl<'a> Lowering<'_, 'a> {
         let bytes = self.b.op(Op::Mul, &[index, size], site);
         let address = self.b.op(Op::Add, &[start, bytes], site);
         let place = self.deref(address, to, span);
-        self.at(place, to, span)
+        Operand { dynamic: true, ..self.at(place, to, span) }
     }
 
     pub(crate) fn part(&mut self, base: &'a Expr, part: Part, span: Span) -> Operand {

@@ -1,12 +1,11 @@
 //! Which bodies take part in a cycle of calls: they count depth and take fuel.
 
 use crate::unit::Compiler;
-use takt_ir::{Body, Inst};
 
 impl Compiler<'_> {
     /// Marks every body that can reach itself (Tarjan's strongly connected components, without recursion).
     pub(crate) fn mark_recursion(&mut self) {
-        let edges: Vec<Vec<usize>> = self.program.bodies.iter().map(callees).collect();
+        let edges: Vec<Vec<usize>> = self.program.bodies.iter().map(|body| self.program.callees(body)).collect();
         for component in components(&edges) {
             let cyclic = component.len() > 1 || edges[component[0]].contains(&component[0]);
             for body in component.into_iter().filter(|_| cyclic) {
@@ -14,14 +13,6 @@ impl Compiler<'_> {
             }
         }
     }
-}
-
-fn callees(body: &Body) -> Vec<usize> {
-    let calls = body.blocks.iter().flat_map(|b| &b.insts).filter_map(|i| match i {
-        Inst::Call { body, .. } => Some(body.0 as usize),
-        _ => None,
-    });
-    calls.collect()
 }
 
 fn components(edges: &[Vec<usize>]) -> Vec<Vec<usize>> {

@@ -1,10 +1,11 @@
 //! What names mean: the entries of the scopes.
 
 use crate::constant::Value;
+use std::collections::HashMap;
 use takt_abi::FnDesc;
 use takt_ir::{BodyId, Local, TypeId};
 use takt_syntax::Span;
-use takt_syntax::tree::{self, VarKind};
+use takt_syntax::tree::{self, Modifiers, VarKind};
 
 /// The key under which a name is found.
 pub(crate) fn key(name: &str) -> String {
@@ -45,28 +46,88 @@ pub(crate) struct Variable<'a> {
     pub(crate) span: Span,
 }
 
+/// What a body belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PouKind {
+    Function,
+    FunctionBlock,
+    Program,
+    /// METHOD, or GET or SET of a PROPERTY.
+    Method,
+    Action,
+}
+
+/// What the source says of something with a body.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Head<'a> {
+    pub(crate) kind: PouKind,
+    pub(crate) name: &'a tree::Name,
+    pub(crate) modifiers: Modifiers,
+    pub(crate) result: Option<&'a tree::TypeExpr>,
+    pub(crate) vars: &'a [tree::VarBlock],
+    pub(crate) body: &'a [tree::Stmt],
+    pub(crate) pragmas: &'a [tree::Pragma],
+    pub(crate) doc: Option<&'a str>,
+}
+
+/// What a method belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Owner {
+    Pou(usize),
+    Interface(usize),
+}
+
+/// A member of a block, program or interface that has bodies: their units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Member {
+    Method(usize),
+    Action(usize),
+    Property { get: Option<usize>, set: Option<usize> },
+}
+
 /// A unit with a body.
 #[derive(Debug)]
 pub(crate) struct Pou<'a> {
-    pub(crate) tree: &'a tree::Pou,
+    pub(crate) tree: Head<'a>,
     pub(crate) state: Progress,
     /// Type of instances (FUNCTION_BLOCK, PROGRAM).
     pub(crate) ty: Option<TypeId>,
-    /// Result type of a FUNCTION.
+    /// Result type of a FUNCTION or METHOD.
     pub(crate) result: Option<TypeId>,
     /// All variables with types; storage as far as it does not depend on the body.
     pub(crate) vars: Vec<Variable<'a>>,
     /// Where in `vars` a name is.
-    pub(crate) index: std::collections::HashMap<String, usize>,
-    /// Initial values that are not bytes: offset in the instance, type, expression.
-    pub(crate) late: Vec<(u32, TypeId, &'a tree::Expr)>,
+    pub(crate) index: HashMap<String, usize>,
     /// Offset of the singleton of a PROGRAM.
     pub(crate) instance: u32,
     /// Its body, once asked for.
     pub(crate) body: Option<BodyId>,
-    /// Bodies of its actions, once asked for.
-    pub(crate) actions: Vec<(String, Option<BodyId>)>,
+    /// The body that sets what its instances hold at the start and what is not bytes, once asked for.
+    pub(crate) start: Option<BodyId>,
     pub(crate) library: bool,
+    /// Where a METHOD or ACTION belongs to.
+    pub(crate) owner: Option<Owner>,
+    /// Methods, properties and actions of its own.
+    pub(crate) members: HashMap<String, Member>,
+    /// EXTENDS.
+    pub(crate) base: Option<usize>,
+    /// What extends it directly.
+    pub(crate) children: Vec<usize>,
+    /// IMPLEMENTS, without what its base implements.
+    pub(crate) implements: Vec<usize>,
+    /// Number of the class (see [`takt_ir::Class`]), 0 if its instances need not be found.
+    pub(crate) class: u32,
+    /// Offsets of VAR_INST in the instance of the owner.
+    pub(crate) kept: HashMap<String, (TypeId, u32)>,
+}
+
+/// An INTERFACE.
+#[derive(Debug)]
+pub(crate) struct Interface<'a> {
+    pub(crate) tree: &'a tree::Interface,
+    pub(crate) ty: TypeId,
+    pub(crate) extends: Vec<usize>,
+    pub(crate) members: HashMap<String, Member>,
 }
 
 /// How far something is resolved.
@@ -102,7 +163,7 @@ pub(crate) struct GlobalVar<'a> {
 pub(crate) struct List {
     pub(crate) name: String,
     pub(crate) qualified_only: bool,
-    pub(crate) vars: std::collections::HashMap<String, usize>,
+    pub(crate) vars: HashMap<String, usize>,
     pub(crate) slot: i64,
 }
 
@@ -110,6 +171,7 @@ pub(crate) struct List {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Item {
     Pou(usize),
+    Interface(usize),
     Type(usize),
     /// A type that is complete (native ones).
     Ready(TypeId),

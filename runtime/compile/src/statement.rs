@@ -33,7 +33,10 @@ impl<'a> Lowering<'_, 'a> {
             StmtKind::Repeat { body, until } => self.repeat_statement(body, until, s.span),
             StmtKind::Exit => self.leave(s.span, "EXIT", |l| l.exit),
             StmtKind::Continue => self.leave(s.span, "CONTINUE", |l| l.next),
-            StmtKind::Return => self.return_(),
+            StmtKind::Return => {
+                self.leave_protected(0);
+                self.return_();
+            }
             StmtKind::Jump(label) => {
                 let block = self.label(&label.text, label.span, false);
                 self.jump_back(block, s.span);
@@ -43,9 +46,7 @@ impl<'a> Lowering<'_, 'a> {
                 self.b.continue_in(block);
             }
             StmtKind::Empty | StmtKind::Error => {}
-            StmtKind::Try { .. } => {
-                self.report(Code::NotSupported, s.span, "__TRY is not supported yet");
-            }
+            StmtKind::Try { body, catch, finally } => self.try_statement(body, catch.as_ref(), finally.as_deref(), s.span),
         }
     }
 
@@ -93,7 +94,10 @@ impl<'a> Lowering<'_, 'a> {
 
     fn leave(&mut self, span: Span, word: &str, to: fn(&Loop) -> BlockId) {
         match self.loops.last().map(to) {
-            Some(block) => self.b.end(Term::Jump(block)),
+            Some(block) => {
+                self.leave_protected(self.loops.len());
+                self.b.end(Term::Jump(block));
+            }
             None => {
                 self.report(Code::BadStatement, span, format!("{word} is only possible inside FOR, WHILE or REPEAT"));
             }
@@ -122,23 +126,21 @@ impl<'a> Lowering<'_, 'a> {
         for (target, op) in targets.iter().rev() {
             match op {
                 AssignOp::Assign => {
-                    let place = self.expr(target);
+                    let place = self.target(target);
                     self.assign(place.clone(), value.clone());
                     if targets.len() > 1 && !place.is_error() {
-                        value = place;
+                        value = self.read_back(place);
                     }
                 }
                 AssignOp::Set | AssignOp::Reset => self.set_or_reset(target, value.clone(), *op),
                 AssignOp::Ref => self.assign_reference(target, value.clone()),
-                AssignOp::Try => {
-                    self.report(Code::NotSupported, span, "`?=` is not supported yet");
-                }
+                AssignOp::Try => self.try_assign(target, value.clone(), span),
             }
         }
     }
 
     fn set_or_reset(&mut self, target: &'a Expr, value: Operand, op: AssignOp) {
-        let place = self.expr(target);
+        let place = self.target(target);
         let value = self.condition_operand(value);
         let place_ok = self.condition_operand(place.clone());
         if value.is_error() || place_ok.is_error() {
@@ -156,7 +158,11 @@ impl<'a> Lowering<'_, 'a> {
 
     /// The pointer that `REF=` stores: of another reference, or of a variable.
     fn reference_to(&mut self, e: &'a Expr) -> Operand {
-        let crate::expression::Thing::Value(operand) = self.thing_raw(e) else { return self.expr(e) };
+        let operand = match self.thing_raw(e) {
+            crate::expression::Thing::Value(operand) => operand,
+            crate::expression::Thing::Member(bound) if bound.is_property() => self.get_property(*bound, e.span),
+            _ => return self.expr(e),
+        };
         if operand.is_error() || matches!(self.c.types.get(operand.ty), Type::Reference(_)) {
             return operand;
         }
@@ -167,9 +173,14 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     fn assign_reference(&mut self, target: &'a Expr, value: Operand) {
-        let crate::expression::Thing::Value(place) = self.thing_raw(target) else {
-            self.expr(target);
-            return;
+        let place = match self.thing_raw(target) {
+            crate::expression::Thing::Value(place) => place,
+            crate::expression::Thing::Member(bound) if bound.is_property() => {
+                return if !value.is_error() {
+                    self.set_property(&bound, value, target.span)
+                };
+            }
+            _ => return drop(self.expr(target)),
         };
         if place.is_error() || value.is_error() {
             return;
@@ -183,7 +194,7 @@ impl<'a> Lowering<'_, 'a> {
             Type::Pointer(t) | Type::Reference(t) => Some(*t),
             _ => None,
         };
-        if from.is_some_and(|from| from != to) {
+        if from.is_some_and(|from| !self.refers_to(to, from)) {
             let (wanted, found) = (self.type_name(to), from.map(|f| self.type_name(f)).unwrap_or_default());
             self.report(Code::TypeMismatch, value.span, format!("expected a variable of type `{wanted}`, found `{found}`"));
             return;
@@ -197,6 +208,11 @@ impl<'a> Lowering<'_, 'a> {
         let target = self.follow(target);
         if target.is_error() {
             return;
+        }
+        if let Kind::Property(bound) = &target.kind {
+            return if !value.is_error() {
+                self.set_property(bound, value, target.span)
+            };
         }
         let place = match (&target.kind, target.fixed) {
             (Kind::Place(place), None) => place.clone(),
@@ -235,6 +251,29 @@ impl<'a> Lowering<'_, 'a> {
                 self.store(place, ty, src, value.exact, span);
             }
         }
+    }
+
+    /// `reference ?= value`: as `REF=` if the instance is of the type, else NULL.
+    fn try_assign(&mut self, target: &'a Expr, value: Operand, span: Span) {
+        let crate::expression::Thing::Value(place) = self.thing_raw(target) else { return drop(self.expr(target)) };
+        if place.is_error() || value.is_error() {
+            return;
+        }
+        let of = match *self.c.types.get(place.ty) {
+            Type::Reference(to) | Type::Pointer(to) => self.c.pou_of_type.get(&to).copied().map(crate::scope::Owner::Pou),
+            Type::Interface(_) => self.c.interface_of_type.get(&place.ty).copied().map(crate::scope::Owner::Interface),
+            _ => None,
+        };
+        let (Some(of), Some(pointer), Kind::Place(target)) = (of, self.instance_pointer(&value), place.kind.clone()) else {
+            self.report(Code::TypeMismatch, span, "`?=` needs an interface, or a POINTER or REFERENCE TO a block, on both sides");
+            return;
+        };
+        let family = self.c.family_number(of);
+        let site = self.site(span);
+        let (found, zero) = (self.b.local(Ty::I64), self.b.int(0));
+        self.b.push(Inst::IsA { dst: found, pointer, family });
+        let word = self.b.op(Op::Select, &[found, pointer, zero], site);
+        self.store(&target, place.ty, word, true, span);
     }
 
     /// Binds a local REFERENCE where it is declared.

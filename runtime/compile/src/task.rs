@@ -3,14 +3,17 @@
 use crate::constant::Value;
 use crate::emit::Builder;
 use crate::initial::Known;
-use crate::scope::{Item, key};
+use crate::scope::{Item, PouKind, key};
 use crate::unit::Compiler;
 use takt_ir::{BodyId, Inst, Task, Term, Trigger};
-use takt_syntax::tree::{self, PouKind, Unit};
+use takt_syntax::tree::{self, Unit};
 use takt_syntax::{Code, FileId, Span};
 
 /// Bytes of stack region per task.
 const STACK: u32 = 1 << 20;
+
+/// Bytes of the heap unless the project says otherwise.
+const HEAP: u32 = 1 << 20;
 
 /// Period of the task that is meant without a CONFIGURATION: 10 ms.
 const DEFAULT_PERIOD: i64 = 10_000_000;
@@ -127,7 +130,7 @@ impl<'a> Compiler<'a> {
         self.names.insert(key(&name.text), Item::Pou(pou));
         let ty = self.pou_type(pou);
         let offset = self.pous[pou].instance;
-        let doc = self.pous[pou].tree.doc.clone().unwrap_or_default();
+        let doc = self.pous[pou].tree.doc.unwrap_or_default().into();
         self.program.globals.push(takt_ir::Global { name: name.text.clone(), bare: true, ty, offset, constant: false, doc });
     }
 
@@ -216,6 +219,12 @@ impl<'a> Compiler<'a> {
         for Planned { name, trigger, priority, entry, span } in tasks {
             let start = self.take(STACK, 16, span);
             self.program.tasks.push(Task { name, trigger, priority, entry, stack: (start, STACK) });
+        }
+        if self.heap {
+            let wanted = if self.options.heap == 0 { HEAP } else { self.options.heap };
+            let len = wanted.max(16).checked_next_power_of_two().unwrap_or(1 << 31);
+            let span = Span { file: FileId(0), start: 0, end: 0 };
+            self.program.heap = (self.take(len, 16, span), len);
         }
         self.program.image_size = self.next.next_multiple_of(16) as u32;
         self.program.resources.sort_by_key(|r| r.offset);

@@ -2,12 +2,12 @@
 
 use crate::constant::{Value, cut, range};
 use crate::initial::Target;
-use crate::scope::{Item, Progress, Storage, Variable, key};
+use crate::scope::{Item, PouKind, Progress, Storage, Variable, key};
 use crate::unit::Compiler;
 use std::rc::Rc;
 use takt_abi::{Elem, Section};
 use takt_ir::{Enumeration, Field, StructKind, Structure, Type, TypeId};
-use takt_syntax::tree::{self, PouKind, TypeExpr, TypeExprKind, TypeKind, VarKind};
+use takt_syntax::tree::{self, TypeExpr, TypeExprKind, TypeKind, VarKind};
 use takt_syntax::{Code, Span};
 
 /// Bytes that one variable may have.
@@ -72,7 +72,7 @@ impl<'a> Compiler<'a> {
             TypeExprKind::Enum(body) => self.enum_type(&format!("(enumeration at {})", t.span.start), body, pou),
             TypeExprKind::Struct(fields) => {
                 let id = self.types.push(Type::Error);
-                self.structure(id, "(structure)", fields, StructKind::Struct)
+                self.structure(id, "(structure)", fields, StructKind::Struct, None)
             }
             TypeExprKind::Error => self.error_type(),
         }
@@ -138,7 +138,8 @@ impl<'a> Compiler<'a> {
         match item {
             Some(Item::Type(i)) => self.declared_type(i, direct, span),
             Some(Item::Ready(ty) | Item::NativeBlock(ty)) => ty,
-            Some(Item::Pou(i)) if self.pous[i].tree.kind != PouKind::Function => {
+            Some(Item::Interface(i)) => self.interfaces[i].ty,
+            Some(Item::Pou(i)) if matches!(self.pous[i].tree.kind, PouKind::FunctionBlock | PouKind::Program) => {
                 if direct {
                     let inside_itself = self.pous[i].state == Progress::Running;
                     self.resolve_pou(i, span);
@@ -200,15 +201,13 @@ impl<'a> Compiler<'a> {
         let name = &tree.name.text;
         match &tree.kind {
             TypeKind::Struct { extends, fields } => {
-                if let Some(base) = extends {
-                    self.report(Code::NotSupported, base.span, "STRUCT EXTENDS is not supported yet");
-                }
                 let id = self.declared[index].ty.expect("given before");
-                self.structure(id, name, fields, StructKind::Struct)
+                let base = extends.as_ref().and_then(|base| self.base_structure(id, base));
+                self.structure(id, name, fields, StructKind::Struct, base)
             }
             TypeKind::Union { fields } => {
                 let id = self.declared[index].ty.expect("given before");
-                self.structure(id, name, fields, StructKind::Union)
+                self.structure(id, name, fields, StructKind::Union, None)
             }
             TypeKind::Enum(body) => self.enum_type(name, body, None),
             TypeKind::Alias { ty, .. } => self.type_expr(ty, None, true),
@@ -266,9 +265,41 @@ impl<'a> Compiler<'a> {
         self.constant_int(expr, pou)
     }
 
-    fn structure(&mut self, id: TypeId, name: &str, decls: &'a [tree::VarDecl], kind: StructKind) -> TypeId {
-        let mut layout = Layout::default();
-        let mut fields: Vec<Field> = Vec::new();
+    /// What a STRUCT extends.
+    fn base_structure(&mut self, own: TypeId, name: &'a tree::Name) -> Option<TypeId> {
+        let base = self.named_type(std::slice::from_ref(name), name.span, true);
+        match self.types.get(base) {
+            Type::Struct(s) if s.kind == StructKind::Struct => {
+                self.struct_bases.insert(own, base);
+                Some(base)
+            }
+            Type::Error => None,
+            _ => {
+                self.report(Code::UnknownType, name.span, format!("a STRUCT extends a STRUCT, `{}` is none", name.text));
+                None
+            }
+        }
+    }
+
+    /// Whether a STRUCT extends another, directly or through others.
+    pub(crate) fn struct_extends(&self, ty: TypeId, base: TypeId) -> bool {
+        std::iter::successors(self.struct_bases.get(&ty), |ty| self.struct_bases.get(ty)).any(|b| *b == base)
+    }
+
+    /// The name of the ABSTRACT block that variables of a type would be or contain.
+    pub(crate) fn abstract_block(&self, ty: TypeId) -> Option<String> {
+        match self.types.get(ty) {
+            Type::Array { elem, .. } => self.abstract_block(*elem),
+            Type::Struct(_) => {
+                let tree = self.pous[*self.pou_of_type.get(&ty)?].tree;
+                (tree.modifiers.is_abstract && tree.kind == PouKind::FunctionBlock).then(|| tree.name.text.clone())
+            }
+            _ => None,
+        }
+    }
+
+    fn structure(&mut self, id: TypeId, name: &str, decls: &'a [tree::VarDecl], kind: StructKind, base: Option<TypeId>) -> TypeId {
+        let (mut layout, mut fields) = self.inherited(base);
         for decl in decls {
             let ty = self.variable_type(decl, None);
             if fields.iter().any(|f| key(&f.name) == key(&decl.name.text)) {
@@ -290,14 +321,39 @@ impl<'a> Compiler<'a> {
         self.types.set(id, Type::Struct(Box::new(Structure { name: name.into(), kind, fields, size, align })));
         let mut bytes = vec![0; size as usize];
         let mut late = Vec::new();
-        for (decl, (offset, ty)) in decls.iter().zip(offsets) {
-            self.fill(decl, ty, offset, &mut Target { pou: None, bytes: &mut bytes, late: &mut late });
+        if let Some(base) = base {
+            late.extend(self.type_late.get(&base).iter().flat_map(|late| late.iter()).copied());
+            self.inherit_bytes(base, &mut bytes);
         }
-        self.refuse_late(&late);
+        let own = &offsets[offsets.len() - decls.len()..];
+        for (decl, (offset, ty)) in decls.iter().zip(own) {
+            self.fill(decl, *ty, *offset, &mut Target { pou: None, bytes: &mut bytes, late: &mut late });
+        }
+        self.keep_initial(id, bytes, late);
+        id
+    }
+
+    /// Members and room that a type has from the one it extends.
+    fn inherited(&self, base: Option<TypeId>) -> (Layout, Vec<Field>) {
+        match base.map(|base| self.types.get(base)) {
+            Some(Type::Struct(s)) => (Layout { size: s.size.into(), align: s.align }, s.fields.clone()),
+            _ => Default::default(),
+        }
+    }
+
+    fn inherit_bytes(&self, base: TypeId, bytes: &mut [u8]) {
+        if let Some(template) = self.type_init.get(&base) {
+            bytes[..template.len()].copy_from_slice(template);
+        }
+    }
+
+    fn keep_initial(&mut self, id: TypeId, bytes: Vec<u8>, late: Vec<crate::initial::Late<'a>>) {
         if bytes.iter().any(|b| *b != 0) {
             self.type_init.insert(id, Rc::new(bytes));
         }
-        id
+        if !late.is_empty() {
+            self.type_late.insert(id, Rc::new(late));
+        }
     }
 
     fn too_large(&mut self, size: u32, span: Option<Span>) {
@@ -312,6 +368,10 @@ impl<'a> Compiler<'a> {
         if let Type::OpenArray { .. } = self.types.get(ty) {
             self.report(Code::TypeMismatch, decl.ty.span, "ARRAY[*] is only possible as VAR_IN_OUT");
             return self.error_type();
+        }
+        if let Some(name) = self.abstract_block(ty) {
+            self.report(Code::Abstract, decl.ty.span, format!("`{name}` is ABSTRACT and has no instances")).help =
+                Some(format!("declare a block that extends it, or `REFERENCE TO {name}`"));
         }
         ty
     }
@@ -333,7 +393,7 @@ impl<'a> Compiler<'a> {
             Progress::Done => return,
             Progress::Running => {
                 let name = self.pous[index].tree.name.text.clone();
-                if self.pous[index].tree.kind != PouKind::Function {
+                if matches!(self.pous[index].tree.kind, PouKind::FunctionBlock | PouKind::Program) {
                     self.report(Code::Circular, at, format!("`{name}` contains itself")).help =
                         Some("use POINTER TO or REFERENCE TO to break the cycle".into());
                 }
@@ -342,13 +402,18 @@ impl<'a> Compiler<'a> {
             Progress::Untouched => self.pous[index].state = Progress::Running,
         }
         let tree = self.pous[index].tree;
-        self.pous[index].result = tree.result.as_ref().map(|t| self.type_expr(t, Some(index), true));
-        for block in &tree.vars {
+        for other in [self.pous[index].base, self.owner_of(index)].into_iter().flatten() {
+            if self.pous[other].state == Progress::Untouched || self.pous[index].base == Some(other) {
+                self.resolve_pou(other, at);
+            }
+        }
+        self.pous[index].result = tree.result.map(|t| self.type_expr(t, Some(index), true));
+        for block in tree.vars {
             for decl in &block.vars {
                 self.declare_variable(index, block, decl);
             }
         }
-        if tree.kind != PouKind::Function {
+        if matches!(tree.kind, PouKind::FunctionBlock | PouKind::Program) {
             self.lay_out_instance(index);
         }
         self.pous[index].state = Progress::Done;
@@ -370,18 +435,22 @@ impl<'a> Compiler<'a> {
         if let Some(at) = &decl.at {
             self.report(Code::NotSupported, at.span, "a direct address is only supported in VAR_GLOBAL");
         }
-        if !decl.fb_init.is_empty() {
-            self.report(Code::NotSupported, decl.name.span, "arguments of FB_Init are not supported yet");
-        }
         let value = if block.constant && decl.init.is_some() { self.constant_of(decl, ty, Some(index)) } else { None };
         let position = self.pous[index].vars.len();
+        let storage = match (block.kind, self.owner_of(index)) {
+            (VarKind::Inst, Some(owner)) => {
+                let kept = self.pous[owner].kept.get(&kept_key(&self.pous[index].tree.name.text, &decl.name.text));
+                kept.map_or(Storage::Nowhere, |(_, offset)| Storage::This(*offset))
+            }
+            _ => Storage::Nowhere,
+        };
         let variable = Variable {
             name: decl.name.text.clone(),
             kind: block.kind,
             ty,
             constant: block.constant,
             init: decl.init.as_ref(),
-            storage: Storage::Nowhere,
+            storage,
             value,
             decl,
             span: decl.name.span,
@@ -398,8 +467,9 @@ impl<'a> Compiler<'a> {
     fn lay_out_instance(&mut self, index: usize) {
         let id = self.pou_type(index);
         let tree = self.pous[index].tree;
-        let mut layout = Layout::default();
-        let mut fields = Vec::new();
+        let base = self.pous[index].base.map(|base| self.pou_type(base));
+        let (mut layout, mut fields) = self.inherited(base);
+        let class = self.pous[index].class != 0;
         let mut filled = Vec::new();
         for i in 0..self.pous[index].vars.len() {
             let v = self.pous[index].vars[i].clone();
@@ -411,7 +481,8 @@ impl<'a> Compiler<'a> {
                 (VarKind::InOut, _) => (8, 8),
                 _ => self.types.layout(v.ty),
             };
-            let offset = layout.add(size, align);
+            // An instance of another class must not begin where this one does.
+            let offset = layout.add_behind(size, align, class);
             let section = match v.kind {
                 VarKind::Input => Section::Input,
                 VarKind::Output => Section::Output,
@@ -424,30 +495,54 @@ impl<'a> Compiler<'a> {
                 filled.push((v.decl, v.ty, offset));
             }
         }
+        for (name, decl, ty) in self.kept_variables(index) {
+            let (size, align) = self.types.layout(ty);
+            let offset = layout.add_behind(size, align, class);
+            self.pous[index].kept.insert(key(&name), (ty, offset));
+            fields.push(Field { name, ty, offset, section: Section::State, doc: decl.doc.clone().unwrap_or_default() });
+            filled.push((decl, ty, offset));
+        }
+        if class {
+            layout.align = layout.align.max(takt_abi::GRANULE as u32);
+            layout.size = layout.size.max(1);
+        }
         let (size, align) = layout.end();
         self.too_large(size, Some(tree.name.span));
         let kind = if tree.kind == PouKind::Program { StructKind::Program } else { StructKind::Block };
         self.types.set(id, Type::Struct(Box::new(Structure { name: tree.name.text.clone(), kind, fields, size, align })));
         let mut bytes = vec![0; size as usize];
         let mut late = Vec::new();
+        if let Some(base) = base {
+            self.inherit_bytes(base, &mut bytes);
+        }
         for (decl, ty, offset) in filled {
             self.fill(decl, ty, offset, &mut Target { pou: Some(index), bytes: &mut bytes, late: &mut late });
         }
-        if tree.kind == PouKind::Program {
-            self.pous[index].late = late;
-        } else {
-            self.refuse_late(&late);
-        }
-        if bytes.iter().any(|b| *b != 0) {
-            self.type_init.insert(id, Rc::new(bytes));
+        self.keep_initial(id, bytes, late);
+    }
+
+    /// The block or program that a method or action belongs to.
+    fn owner_of(&self, index: usize) -> Option<usize> {
+        match self.pous[index].owner {
+            Some(crate::scope::Owner::Pou(owner)) => Some(owner),
+            _ => None,
         }
     }
 
-    fn refuse_late(&mut self, late: &[(u32, TypeId, &'a tree::Expr)]) {
-        for (_, _, expr) in late {
-            self.report(Code::NotConstant, expr.span, "the initial value of a member must be a constant").help =
-                Some("assign it in the first scan instead".into());
+    /// VAR_INST of the methods: they lie in the instance.
+    fn kept_variables(&mut self, index: usize) -> Vec<(String, &'a tree::VarDecl, TypeId)> {
+        let mut kept = Vec::new();
+        for unit in (0..self.pous.len()).skip(index + 1) {
+            if self.owner_of(unit) != Some(index) {
+                break;
+            }
+            let tree = self.pous[unit].tree;
+            for decl in tree.vars.iter().filter(|b| b.kind == VarKind::Inst).flat_map(|b| &b.vars) {
+                let ty = self.variable_type(decl, Some(index));
+                kept.push((kept_key(&tree.name.text, &decl.name.text), decl, ty));
+            }
         }
+        kept
     }
 
     /// Resolves type and (of a constant) value of a global.
@@ -481,7 +576,9 @@ impl<'a> Compiler<'a> {
     /// The nearest known name, as help.
     pub(crate) fn suggest(&self, name: &str, types_only: bool) -> Option<String> {
         let wanted = key(name);
-        let usable = |item: &Item| !types_only || matches!(item, Item::Type(_) | Item::Ready(_) | Item::NativeBlock(_) | Item::Pou(_));
+        let usable = |item: &Item| {
+            !types_only || matches!(item, Item::Type(_) | Item::Ready(_) | Item::NativeBlock(_) | Item::Pou(_) | Item::Interface(_))
+        };
         let elementary = ELEMENTARY.iter().map(|(n, _)| *n).chain(["STRING", "WSTRING"]).filter(|_| types_only).map(String::from);
         let known = self.names.iter().chain(&self.library_names).filter(|(_, i)| usable(i)).map(|(n, _)| n.clone());
         nearest(&wanted, known.chain(elementary)).map(|n| format!("did you mean `{n}`?"))
@@ -527,6 +624,13 @@ impl Layout {
         self.size = at + u64::from(size);
         at.min(u32::MAX.into()) as u32
     }
+    /// As [`Layout::add`], but not at the start if a class must not begin there.
+    fn add_behind(&mut self, size: u32, align: u32, class: bool) -> u32 {
+        if class && self.size == 0 && u64::from(align) >= takt_abi::GRANULE {
+            self.size = takt_abi::GRANULE;
+        }
+        self.add(size, align)
+    }
     fn overlay(&mut self, size: u32, align: u32) -> u32 {
         self.align = self.align.max(align);
         self.size = self.size.max(size.into());
@@ -537,6 +641,11 @@ impl Layout {
         let align = self.align.max(1);
         (self.size.next_multiple_of(align.into()).clamp(1, u32::MAX.into()) as u32, align)
     }
+}
+
+/// The name of a VAR_INST among the members of its block.
+fn kept_key(method: &str, name: &str) -> String {
+    key(&format!("{method}.{name}"))
 }
 
 pub(crate) fn is_integer(e: Elem) -> bool {

@@ -1,7 +1,7 @@
 //! The compiler's state and the order of its work.
 
 use crate::emit::Builder;
-use crate::scope::{Declared, GlobalVar, Item, List, Pou};
+use crate::scope::{Declared, GlobalVar, Interface, Item, List, Owner, Pou, PouKind};
 use crate::sites::Sites;
 use crate::{Input, Options};
 use std::collections::HashMap;
@@ -11,8 +11,10 @@ use takt_syntax::{Code, Diagnostic, FileId, Source, Span, tree};
 /// What a queued body is made of.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Job {
+    /// The statements of a unit.
     Pou(usize),
-    Action(usize, usize),
+    /// What instances of a block hold at the start.
+    Start(usize),
 }
 
 /// Everything that is known while a program is compiled.
@@ -34,19 +36,36 @@ pub(crate) struct Compiler<'a> {
     pub(crate) declared: Vec<Declared<'a>>,
     pub(crate) globals: Vec<GlobalVar<'a>>,
     pub(crate) lists: Vec<List>,
+    pub(crate) interfaces: Vec<Interface<'a>>,
+    pub(crate) interface_of_type: HashMap<TypeId, usize>,
+    /// EXTENDS of blocks and IMPLEMENTS as written, until they are linked.
+    pub(crate) extends: Vec<(Owner, &'a tree::Name)>,
+    pub(crate) implements: Vec<(usize, &'a tree::Name)>,
+    /// Blocks by number of their class, from 1.
+    pub(crate) classes: Vec<usize>,
+    /// Methods that are found by class, in order of [`Program::dispatch`].
+    pub(crate) methods: crate::class::Methods,
+    /// Types that are asked for at run time, in order of [`Program::families`].
+    pub(crate) families: Vec<Owner>,
+    /// What variables of a type hold at the start and what is not bytes.
+    pub(crate) type_late: HashMap<TypeId, std::rc::Rc<Vec<crate::initial::Late<'a>>>>,
+    /// The program uses `__NEW`.
+    pub(crate) heap: bool,
     pub(crate) native_blocks: HashMap<TypeId, &'static takt_abi::BlockDesc>,
     /// Initial bytes of struct-like types with an initial value of their own.
     pub(crate) type_init: HashMap<TypeId, std::rc::Rc<Vec<u8>>>,
     /// Initial values of aliases and enumerations.
     pub(crate) pou_of_type: HashMap<TypeId, usize>,
+    /// STRUCT EXTENDS.
+    pub(crate) struct_bases: HashMap<TypeId, TypeId>,
     pub(crate) program: Program,
     pub(crate) natives: HashMap<&'static str, NativeId>,
     pub(crate) sites: Sites,
     pub(crate) queue: Vec<(BodyId, Job)>,
     /// Next free byte of the image.
     pub(crate) next: u64,
-    /// Statements that set what cannot be bytes: (variable's place, initialiser).
-    pub(crate) late: Vec<crate::initial::Late<'a>>,
+    /// Statements that set what cannot be bytes, with the unit whose names they use.
+    pub(crate) late: Vec<(Option<usize>, crate::initial::Late<'a>)>,
 }
 
 impl<'a> Compiler<'a> {
@@ -66,9 +85,19 @@ impl<'a> Compiler<'a> {
             declared: Vec::new(),
             globals: Vec::new(),
             lists: Vec::new(),
+            interfaces: Vec::new(),
+            interface_of_type: HashMap::new(),
+            extends: Vec::new(),
+            implements: Vec::new(),
+            classes: Vec::new(),
+            methods: Default::default(),
+            families: Vec::new(),
+            type_late: HashMap::new(),
+            heap: false,
             native_blocks: HashMap::new(),
             type_init: HashMap::new(),
             pou_of_type: HashMap::new(),
+            struct_bases: HashMap::new(),
             program: Program::default(),
             natives: HashMap::new(),
             sites: Sites::new(files),
@@ -83,13 +112,16 @@ impl<'a> Compiler<'a> {
         self.program.files = self.files.iter().map(|f| f.name.clone()).collect();
         self.register_libraries();
         self.collect();
+        self.link();
         self.resolve_all();
+        self.check_classes();
         self.lay_out();
         let tasks = self.tasks();
         self.lower_all();
         let conditions = self.lower_conditions();
         self.initialise();
         self.drain();
+        self.finish_classes();
         self.mark_recursion();
         self.finish_image(tasks);
         let mut program = std::mem::take(&mut self.program);
@@ -131,33 +163,40 @@ impl<'a> Compiler<'a> {
         if let Some(body) = self.pous[pou].body {
             return body;
         }
-        let tree = self.pous[pou].tree;
-        let id = self.reserve(&tree.name.text, tree.name.span);
+        let name = self.pou_name(pou);
+        let id = self.reserve(&name, self.pous[pou].tree.name.span);
         self.pous[pou].body = Some(id);
         self.queue.push((id, Job::Pou(pou)));
         id
     }
 
-    /// The body of an action; queued at the first request.
-    pub(crate) fn action_of(&mut self, pou: usize, action: usize) -> BodyId {
-        if let Some(body) = self.pous[pou].actions[action].1 {
+    /// The name of a unit in messages: `FB_Axis.Enable`.
+    pub(crate) fn pou_name(&self, pou: usize) -> String {
+        let name = &self.pous[pou].tree.name.text;
+        match self.pous[pou].owner {
+            Some(Owner::Pou(owner)) => format!("{}.{name}", self.pous[owner].tree.name.text),
+            Some(Owner::Interface(owner)) => format!("{}.{name}", self.interfaces[owner].tree.name.text),
+            None => name.clone(),
+        }
+    }
+
+    /// The body that sets what instances of a block hold at the start; queued at the first request.
+    pub(crate) fn start_of(&mut self, pou: usize) -> BodyId {
+        if let Some(body) = self.pous[pou].start {
             return body;
         }
-        let tree = self.pous[pou].tree;
-        let name = format!("{}.{}", tree.name.text, tree.actions[action].name.text);
-        let id = self.reserve(&name, tree.actions[action].name.span);
-        self.pous[pou].actions[action].1 = Some(id);
-        self.queue.push((id, Job::Action(pou, action)));
+        let name = format!("{} (initial values)", self.pous[pou].tree.name.text);
+        let id = self.reserve(&name, self.pous[pou].tree.name.span);
+        self.pous[pou].start = Some(id);
+        self.queue.push((id, Job::Start(pou)));
         id
     }
 
     fn lower_all(&mut self) {
         for pou in 0..self.pous.len() {
-            if !self.pous[pou].library {
+            let bodiless = matches!(self.pous[pou].owner, Some(Owner::Interface(_))) || self.pous[pou].tree.modifiers.is_abstract;
+            if !self.pous[pou].library && (!bodiless || self.pous[pou].tree.kind == PouKind::FunctionBlock) {
                 self.body_of(pou);
-                for action in 0..self.pous[pou].actions.len() {
-                    self.action_of(pou, action);
-                }
             }
         }
         self.drain();
@@ -166,7 +205,10 @@ impl<'a> Compiler<'a> {
     /// Lowers queued bodies until there is none left.
     pub(crate) fn drain(&mut self) {
         while let Some((id, job)) = self.queue.pop() {
-            let body = self.lower_body(id, job);
+            let body = match job {
+                Job::Pou(pou) => self.lower_body(id, pou),
+                Job::Start(pou) => self.lower_start(id, pou),
+            };
             self.program.bodies[id.0 as usize] = body;
         }
     }

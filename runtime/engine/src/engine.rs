@@ -273,7 +273,7 @@ fn changes_image(program: &Program, body: BodyId) -> bool {
     program.bodies[body.0 as usize].blocks.iter().flat_map(|b| &b.insts).any(|inst| match inst {
         Inst::Store { base, .. } => !own(base),
         Inst::Move { dst, .. } | Inst::Data { dst, .. } => !own(dst),
-        Inst::Call { .. } | Inst::Native { .. } => true,
+        Inst::Call { .. } | Inst::Virtual { .. } | Inst::Native { .. } => true,
         _ => false,
     })
 }

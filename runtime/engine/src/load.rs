@@ -13,7 +13,7 @@ use crate::schedule::{TaskState, default_bus_task};
 use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
-use takt_abi::{Elem, Env, Plain, Resources, Time};
+use takt_abi::{Elem, Env, Plain, Time};
 use takt_ir::{Program, Type, VerifyError, verify};
 use takt_jit::JitError;
 
@@ -138,14 +138,11 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     };
     let mut image = Image::new(program.image_size as usize).ok_or(LoadError::Memory { size: program.image_size })?;
     let mut env = Pinned::new(Env {
-        now: Time(0),
-        period: Time(0),
         task: bus as u32,
-        cycle: 0,
         bus_task: bus as u32,
-        bus_period: Time(0),
-        resources: Resources::default(),
-        host: options.host,
+        classes: program.instances(),
+        heap: program.heap(),
+        ..Env::new(Time(0), options.host)
     });
     let mut lane = || Lane::new(&program, &mut image, &mut env, options.depth_limit);
     let tasks: Vec<_> = (0..program.tasks.len()).map(|i| TaskState::new(&program, i, lane())).collect();

@@ -13,7 +13,7 @@ use std::alloc::{Layout, alloc_zeroed, dealloc};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::NonNull;
-use takt_abi::{Context, Env, Fault, TRACE_DEPTH};
+use takt_abi::{Context, Env, Fault};
 use takt_ir::{BodyId, Interpreter, Program};
 
 const PAGE: usize = 4096;
@@ -95,22 +95,9 @@ pub(crate) struct Lane {
 impl Lane {
     /// A lane on an image and environment.
     pub fn new(program: &Program, image: &mut Image, env: &mut Pinned<Env>, depth_limit: u32) -> Self {
-        let ctx = Context {
-            flag: 0.into(),
-            fault_code: 0,
-            fuel: 0,
-            fault_site: u32::MAX,
-            trace_len: 0,
-            fault_facts: [0; 3],
-            depth: 0,
-            depth_limit,
-            image: image.start.as_ptr(),
-            image_size: image.len as u64,
-            stack_end: 0,
-            poll,
-            trace: [0; TRACE_DEPTH],
-            env: env.0.as_ptr(),
-        };
+        let env_at = env.0.as_ptr();
+        let mut ctx = Context::new(image.start.as_ptr(), image.len as u64, env.get_mut(), poll);
+        (ctx.depth_limit, ctx.env) = (depth_limit, env_at);
         Self { ctx, interpreter: Interpreter::new(program) }
     }
     /// Ready for a scan.

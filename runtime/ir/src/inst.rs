@@ -252,6 +252,50 @@ pub enum Inst {
         /// Place.
         site: SiteId,
     },
+    /// Calls the body that [`crate::Program::dispatch`] has for the class of the instance at `this`: fault `NullPointer` if that is 0, `NoInstance` if no
+    /// instance of a class that has the method begins there.
+    Virtual {
+        /// Number of the method.
+        method: u32,
+        /// Offset of the instance, I64.
+        this: Local,
+        /// Parameters behind the instance.
+        args: Vec<Local>,
+        /// Result.
+        dst: Option<Local>,
+        /// Place.
+        site: SiteId,
+    },
+    /// `dst = 1` if an instance of a class of [`crate::Program::families`] begins at `pointer`, else 0.
+    IsA {
+        /// Result, I64.
+        dst: Local,
+        /// Offset, I64.
+        pointer: Local,
+        /// Number of the family.
+        family: u32,
+    },
+    /// From now on instances of this class stand in the frame (until something else does).
+    Place {
+        /// Offset in the frame of the first, a multiple of [`takt_abi::GRANULE`].
+        offset: u32,
+        /// Class.
+        class: u32,
+        /// How many, one behind the other.
+        count: u32,
+    },
+    /// Keeps the depth of calls for [`Inst::Catch`].
+    Guard {
+        /// Result, I64.
+        dst: Local,
+    },
+    /// First instruction of a handler: takes the fault that led here, and sets the depth of calls back.
+    Catch {
+        /// The number of the fault ([`Fault::code`]), I64.
+        dst: Local,
+        /// What [`Inst::Guard`] kept, I64.
+        depth: Local,
+    },
     /// Takes fuel; when it is used up or the flag is set, the engine decides (fault, preemption).
     Poll {
         /// Units.
@@ -297,6 +341,9 @@ pub struct Block {
     pub insts: Vec<Inst>,
     /// End.
     pub term: Term,
+    /// Where a fault in this block (or in what it calls) leads, if it is one that a program may handle ([`Fault::catchable`]). Addresses that were
+    /// written in this block are not known there.
+    pub handler: Option<BlockId>,
 }
 
 /// A compiled function, block body, program or initialisation.

@@ -92,30 +92,77 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn all(mut self) -> Result<(), u32> {
-        self.enter(&[])?;
-        let (mut block, mut next) = (BlockId(0), 0);
+        self.enter(None, &[])?;
+        let mut at = (BlockId(0), 0);
         loop {
-            let code = &self.body.blocks[block.0 as usize];
-            match code.insts.get(next) {
-                Some(Inst::Call { body, args, dst, site }) => {
-                    let (id, base, frame) = (self.id, self.base, self.frame);
-                    self.own.calls.push(Call { body: id, block, next: next + 1, base, frame, dst: *dst, site: *site });
-                    self.call(*body, args)?;
-                    (block, next) = (BlockId(0), 0);
-                }
-                Some(inst) => {
-                    self.step(inst)?;
-                    next += 1;
-                }
-                None => match self.end(&code.term)? {
-                    Some(target) => (block, next) = (target, 0),
-                    None => match self.own.calls.pop() {
-                        Some(caller) => (block, next) = self.resume(caller),
-                        None => return Ok(()),
-                    },
-                },
+            match self.turn(at) {
+                Ok(Some(next)) => at = next,
+                Ok(None) => return Ok(()),
+                Err(code) => at = (self.handler(code, at.0).ok_or(code)?, 0),
             }
         }
+    }
+
+    /// One instruction or end of a block; where it goes on, `None` at the end of the run.
+    #[inline(always)]
+    fn turn(&mut self, (block, next): (BlockId, usize)) -> Result<Option<(BlockId, usize)>, u32> {
+        let body = self.body;
+        let code = &body.blocks[block.0 as usize];
+        match code.insts.get(next) {
+            Some(Inst::Call { body, args, dst, site }) => {
+                self.leave((block, next), *dst, *site);
+                self.call(*body, None, args)?;
+                Ok(Some((BlockId(0), 0)))
+            }
+            Some(Inst::Virtual { method, this, args, dst, site }) => {
+                let body = self.dispatch(*method, self.get(*this), *site)?;
+                self.leave((block, next), *dst, *site);
+                self.call(body, Some(*this), args)?;
+                Ok(Some((BlockId(0), 0)))
+            }
+            Some(inst) => {
+                self.step(inst)?;
+                Ok(Some((block, next + 1)))
+            }
+            None => Ok(match self.end(&code.term)? {
+                Some(target) => Some((target, 0)),
+                None => self.own.calls.pop().map(|caller| self.resume(caller)),
+            }),
+        }
+    }
+
+    /// Where a fault in that block leads: the handler of the block, or of the nearest caller that has one, in whose body we are then.
+    fn handler(&mut self, code: u32, block: BlockId) -> Option<BlockId> {
+        if !Fault::catchable(code) {
+            return None;
+        }
+        if let Some(handler) = self.body.blocks[block.0 as usize].handler {
+            return Some(handler);
+        }
+        let of = |call: &Call| self.program.bodies[call.body.0 as usize].blocks[call.block.0 as usize].handler;
+        let depth = self.own.calls.iter().rposition(|call| of(call).is_some())?;
+        let caller = self.own.calls[depth];
+        let handler = of(&caller);
+        self.own.calls.truncate(depth);
+        self.resume(Call { dst: None, ..caller });
+        self.own.words.truncate(self.base + self.body.locals.len());
+        handler
+    }
+
+    /// Notes where the caller goes on.
+    #[inline(always)]
+    fn leave(&mut self, (block, next): (BlockId, usize), dst: Option<Local>, site: SiteId) {
+        self.own.calls.push(Call { body: self.id, block, next: next + 1, base: self.base, frame: self.frame, dst, site });
+    }
+
+    /// The body that a method has for the instance.
+    fn dispatch(&mut self, method: u32, this: u64, site: SiteId) -> Result<BodyId, u32> {
+        if this == 0 {
+            return Err(self.fail(Fault::NullPointer, site));
+        }
+        let class = memory::class_at(self.ctx, this);
+        let target = self.program.dispatch[method as usize].target(class);
+        target.ok_or_else(|| self.fail(Fault::NoInstance { offset: this }, site))
     }
 
     #[inline(always)]
@@ -148,11 +195,11 @@ impl<'a> Run<'a> {
     }
 
     /// Makes the words of the body that starts to run and checks frame, depth and fuel.
-    fn enter(&mut self, args: &[Local]) -> Result<(), u32> {
+    fn enter(&mut self, this: Option<Local>, args: &[Local]) -> Result<(), u32> {
         let caller = self.own.calls.last().map_or(0, |c| c.base);
         self.base = self.own.words.len();
         self.own.words.resize(self.base + self.body.locals.len(), 0);
-        for (i, arg) in args.iter().enumerate() {
+        for (i, arg) in this.iter().chain(args).enumerate() {
             self.own.words[self.base + i] = self.own.words[caller + arg.0 as usize];
         }
         let (size, site) = (self.body.frame_size, self.body.entry_site);
@@ -169,11 +216,11 @@ impl<'a> Run<'a> {
         }
         Ok(())
     }
-    fn call(&mut self, id: BodyId, args: &[Local]) -> Result<(), u32> {
+    fn call(&mut self, id: BodyId, this: Option<Local>, args: &[Local]) -> Result<(), u32> {
         self.frame = self.frame.wrapping_add(self.body.frame_size.into());
         self.id = id;
         self.body = &self.program.bodies[id.0 as usize];
-        self.enter(args)
+        self.enter(this, args)
     }
     /// Back in the caller, which gets its result.
     fn resume(&mut self, caller: Call) -> (BlockId, usize) {
@@ -257,7 +304,20 @@ impl<'a> Run<'a> {
             }
             Inst::Native { native, args, dst, site } => self.native(*native, args, *dst, *site)?,
             Inst::Poll { cost, site } => self.poll(*cost, *site)?,
-            Inst::Call { .. } => {}
+            Inst::IsA { dst, pointer, family } => {
+                let class = memory::class_at(self.ctx, self.get(*pointer));
+                self.set(*dst, self.program.families[*family as usize].has(class).into());
+            }
+            Inst::Place { offset, class, count } => {
+                let stride = self.program.class(*class).map_or(takt_abi::GRANULE, |class| class.size.into());
+                memory::place(self.ctx, self.frame.wrapping_add((*offset).into()), *class, stride, (*count).into());
+            }
+            Inst::Guard { dst } => self.set(*dst, self.ctx.depth.into()),
+            Inst::Catch { dst, depth } => {
+                self.set(*dst, self.ctx.fault_code.into());
+                (self.ctx.fault_code, self.ctx.trace_len, self.ctx.depth) = (0, 0, self.get(*depth) as u32);
+            }
+            Inst::Call { .. } | Inst::Virtual { .. } => {}
         }
         Ok(())
     }

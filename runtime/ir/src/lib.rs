@@ -5,6 +5,7 @@
 //! anything but its own image.
 
 mod calendar;
+pub mod heap;
 mod inst;
 mod interp;
 mod literal;
@@ -27,7 +28,7 @@ pub use literal::{ValueError, parse_value};
 pub use op::{Op, Word, ops};
 pub use parse::{ParseError, parse_program};
 pub use print::print_program;
-pub use program::{Global, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger};
+pub use program::{Class, Dispatch, Family, Global, Instances, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger};
 pub use symbols::{Place, SymbolError, resolve};
 pub use types::{Enumeration, Field, StructKind, Structure, Type, TypeId, Types, elem_name, elem_size};
 pub use value::{Scalar, format_value, read_scalar};

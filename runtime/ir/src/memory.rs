@@ -88,6 +88,20 @@ pub(crate) fn write(ctx: &mut Context, dst: u64, from: &[u8]) -> Result<(), Faul
     Ok(())
 }
 
+/// The class of the instance that begins there.
+#[allow(unsafe_code, reason = "the environment is shared with machine code as a raw pointer")]
+pub(crate) fn class_at(ctx: &Context, offset: u64) -> u32 {
+    // SAFETY: the environment lives as long as the context (module invariant), and nobody else uses it while an executor runs.
+    unsafe { &*ctx.env }.classes.at(offset)
+}
+
+/// Notes instances.
+#[allow(unsafe_code, reason = "the environment is shared with machine code as a raw pointer")]
+pub(crate) fn place(ctx: &mut Context, offset: u64, class: u32, stride: u64, count: u64) {
+    // SAFETY: as in `class_at`.
+    unsafe { &*ctx.env }.classes.put(offset, class, stride, count);
+}
+
 /// Calls a native function; word 0 holds the result if the status is 0.
 #[allow(unsafe_code, reason = "native blocks are called through the same pointer as from machine code")]
 pub(crate) fn call_native(ctx: &mut Context, call: NativeFn, words: &mut [u64; NATIVE_WORDS]) -> u32 {

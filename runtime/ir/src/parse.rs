@@ -4,7 +4,7 @@
 //! meant), and without any `site` and `file` a table is made: site *n* is line *n* of a file `ir`.
 
 use crate::inst::{BodyId, Inst, SiteId, Term};
-use crate::program::{Global, Native, Program, Site, Task, Trigger};
+use crate::program::{Class, Dispatch, Family, Global, Instances, Native, Program, Site, Task, Trigger};
 use crate::types::TypeId;
 use cursor::Cursor;
 
@@ -69,6 +69,24 @@ fn item(cursor: &mut Cursor<'_>, program: &mut Program, natives: &dyn Fn(&str) -
         }
         "global" => program.globals.push(global(cursor)?),
         "task" => program.tasks.push(task(cursor)?),
+        "class" => {
+            let name = cursor.text()?;
+            cursor.expect("size")?;
+            program.classes.push(Class { name, size: cursor.number()? });
+        }
+        "instances" => {
+            let class = cursor.number()?;
+            cursor.expect("at")?;
+            let offset = cursor.number()?;
+            cursor.expect("count")?;
+            program.instances.push(Instances { offset, class, count: cursor.number()? });
+        }
+        "method" => program.dispatch.push(dispatch(cursor)?),
+        "family" => {
+            let (name, low) = (cursor.text()?, from(cursor)?);
+            program.families.push(Family { name, low, members: cursor.list("]", |c| c.number::<u8>().map(|n| n != 0))? });
+        }
+        "heap" => program.heap = (cursor.number()?, cursor.number()?),
         "start" => program.init_body = Some(BodyId(cursor.number()?)),
         "body" => {
             let body = code::parse(cursor, program)?;
@@ -102,6 +120,24 @@ fn global(cursor: &mut Cursor<'_>) -> Result<Global, ParseError> {
     let offset = cursor.number()?;
     let (bare, constant) = (cursor.accept("bare"), cursor.accept("constant"));
     Ok(Global { name, bare, ty, offset, constant, doc: cursor.doc()? })
+}
+
+/// `from 1 [`.
+fn from(cursor: &mut Cursor<'_>) -> Result<u32, ParseError> {
+    cursor.expect("from")?;
+    let low = cursor.number()?;
+    cursor.expect("[")?;
+    Ok(low)
+}
+
+fn dispatch(cursor: &mut Cursor<'_>) -> Result<Dispatch, ParseError> {
+    let name = cursor.text()?;
+    cursor.expect("(")?;
+    let params = cursor.list(")", code::ty)?;
+    let result = if cursor.accept("->") { Some(code::ty(cursor)?) } else { None };
+    let low = from(cursor)?;
+    let target = |c: &mut Cursor<'_>| if c.accept("none") { Ok(None) } else { c.number().map(|n| Some(BodyId(n))) };
+    Ok(Dispatch { name, params, result, low, targets: cursor.list("]", target)? })
 }
 
 fn task(cursor: &mut Cursor<'_>) -> Result<Task, ParseError> {
@@ -141,6 +177,7 @@ fn inst_site(inst: &Inst) -> Option<SiteId> {
         | Inst::Check { site, .. }
         | Inst::Deref { site, .. }
         | Inst::Call { site, .. }
+        | Inst::Virtual { site, .. }
         | Inst::Native { site, .. }
         | Inst::Poll { site, .. } => Some(*site),
         _ => None,

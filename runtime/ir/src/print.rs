@@ -9,6 +9,11 @@
 //! data "00ff"                          ; constant bytes
 //! init 64 at 16 "0100"                 ; number of initial bytes, and those that are not 0
 //! native STR_ASSIGN
+//! class "Axis" size 32                 ; numbered from 1
+//! instances 1 at 64 count 2
+//! method "I_Axis.Enable" (i64) -> i64 from 1 [3, none]
+//! family "I_Axis" from 1 [1, 0]
+//! heap 128 64
 //! type INT                             ; numbered from 0
 //! global "GVL.x" type 0 at 16 bare
 //! task "Main" cyclic 1000000 priority 0 entry 0 stack 128 64
@@ -30,9 +35,14 @@
 //!   data image+64, 0, 2                ; to, first byte of the data, bytes
 //!   v2 = call 0(v2, v1) @0
 //!   native STR_ASSIGN(v2, v4) @0
+//!   v2 = virtual 0 v2(v3, v4) @0       ; method, instance, parameters behind it
+//!   v2 = isa v2 0                      ; is it of that family?
+//!   place frame+16 class 1 count 2     ; instances in the frame
+//!   v2 = guard
+//!   v2 = catch v2
 //!   poll 1 @0
 //!   branch v2, b1, b2
-//! b1:
+//! b1 catch b2:                         ; a fault leads to b2
 //!   switch v2 [1: b1, -5: b2] else b0
 //! b2:
 //!   return v2
@@ -84,6 +94,7 @@ impl Printer<'_> {
         for native in &program.natives {
             writeln!(out, "native {}", native.name)?;
         }
+        self.classes(out)?;
         types::print(&program.types, out)?;
         for global in &program.globals {
             write!(out, "global {} type {} at {}", Quoted(&global.name), global.ty.0, global.offset)?;
@@ -104,6 +115,32 @@ impl Printer<'_> {
             writeln!(out, "start {}", body.0)?;
         }
         program.resources.iter().try_for_each(|resource| writeln!(out, "; resource of the instance at {}", resource.offset))
+    }
+
+    fn classes(&self, out: &mut String) -> fmt::Result {
+        let program = self.program;
+        for class in &program.classes {
+            writeln!(out, "class {} size {}", Quoted(&class.name), class.size)?;
+        }
+        for run in &program.instances {
+            writeln!(out, "instances {} at {} count {}", run.class, run.offset, run.count)?;
+        }
+        for method in &program.dispatch {
+            write!(out, "method {} ({})", Quoted(&method.name), List(&method.params))?;
+            if let Some(ty) = method.result {
+                write!(out, " -> {ty}")?;
+            }
+            let targets: Vec<String> = method.targets.iter().map(|t| t.map_or_else(|| "none".into(), |b| b.0.to_string())).collect();
+            writeln!(out, " from {} [{}]", method.low, targets.join(", "))?;
+        }
+        for family in &program.families {
+            let members: Vec<&str> = family.members.iter().map(|m| if *m { "1" } else { "0" }).collect();
+            writeln!(out, "family {} from {} [{}]", Quoted(&family.name), family.low, members.join(", "))?;
+        }
+        if program.heap != (0, 0) {
+            writeln!(out, "heap {} {}", program.heap.0, program.heap.1)?;
+        }
+        Ok(())
     }
 
     fn bodies(&self, out: &mut String) -> fmt::Result {
@@ -127,7 +164,11 @@ impl Printer<'_> {
             writeln!(out, "  local {}", List(locals))?;
         }
         for (number, block) in body.blocks.iter().enumerate() {
-            writeln!(out, "b{number}:")?;
+            write!(out, "b{number}")?;
+            if let Some(handler) = block.handler {
+                write!(out, " catch b{}", handler.0)?;
+            }
+            writeln!(out, ":")?;
             for inst in &block.insts {
                 self.inst(inst, out)?;
             }
@@ -162,6 +203,14 @@ impl Printer<'_> {
                 let name = self.native_name(native.0 as usize);
                 writeln!(out, "native {name}({}) @{}", List(args), site.0)
             }
+            Inst::Virtual { method, this, args, dst, site } => {
+                result(*dst, out)?;
+                writeln!(out, "virtual {method} {this}({}) @{}", List(args), site.0)
+            }
+            Inst::IsA { dst, pointer, family } => writeln!(out, "{dst} = isa {pointer} {family}"),
+            Inst::Place { offset, class, count } => writeln!(out, "place frame+{offset} class {class} count {count}"),
+            Inst::Guard { dst } => writeln!(out, "{dst} = guard"),
+            Inst::Catch { dst, depth } => writeln!(out, "{dst} = catch {depth}"),
             Inst::Poll { cost, site } => writeln!(out, "poll {cost} @{}", site.0),
         }
     }
@@ -196,6 +245,7 @@ fn term(term: &Term, out: &mut String) -> fmt::Result {
                 Fault::WildPointer { offset, size } => format!(" {offset} {size}"),
                 Fault::StackOverflow { depth } => format!(" {depth}"),
                 Fault::Block { error } => format!(" {error}"),
+                Fault::NoInstance { offset } => format!(" {offset}"),
                 _ => String::new(),
             };
             writeln!(out, "fault {}{facts} @{}", fault.name(), site.0)

@@ -1,8 +1,8 @@
 //! A complete program.
 
-use crate::inst::{Body, BodyId};
+use crate::inst::{Body, BodyId, Inst, Ty};
 use crate::types::{TypeId, Types};
-use takt_abi::NativeFn;
+use takt_abi::{Classes, GRANULE, Heap, NativeFn};
 
 /// Bytes at the start of the image that no variable uses, so that NULL and its neighbours are never valid.
 pub const NULL_ZONE: u32 = 16;
@@ -81,6 +81,66 @@ pub struct ResourceInstance {
     pub make: fn() -> Box<dyn takt_abi::Resource>,
 }
 
+/// A block type whose instances calls may be dispatched on. Classes are numbered from 1 ([`Program::class`]).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Class {
+    /// Name of the type.
+    pub name: String,
+    /// Bytes of an instance, a multiple of [`takt_abi::GRANULE`].
+    pub size: u32,
+}
+
+/// Instances of one class that lie one behind the other when the program starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Instances {
+    /// Offset of the first one, a multiple of [`takt_abi::GRANULE`].
+    pub offset: u32,
+    /// Number of the class.
+    pub class: u32,
+    /// How many.
+    pub count: u32,
+}
+
+/// What a call of a method that types may override means for each class.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dispatch {
+    /// As people know it: `I_Axis.Enable`.
+    pub name: String,
+    /// Types of the parameters behind the instance.
+    pub params: Vec<Ty>,
+    /// Result.
+    pub result: Option<Ty>,
+    /// Number of the class that the first target is for.
+    pub low: u32,
+    /// The body per class; the first parameter is the instance. `None`: the class has no such method.
+    pub targets: Vec<Option<BodyId>>,
+}
+
+impl Dispatch {
+    /// The body for a class.
+    pub fn target(&self, class: u32) -> Option<BodyId> {
+        *self.targets.get(class.checked_sub(self.low)? as usize)?
+    }
+}
+
+/// The classes that are of a type: those that extend a block or implement an interface.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Family {
+    /// Name of the type.
+    pub name: String,
+    /// Number of the class that the first member is for.
+    pub low: u32,
+    /// Whether the class belongs to it.
+    pub members: Vec<bool>,
+}
+
+impl Family {
+    /// Whether a class belongs to it.
+    pub fn has(&self, class: u32) -> bool {
+        class.checked_sub(self.low).and_then(|i| self.members.get(i as usize)).is_some_and(|member| *member)
+    }
+}
+
 /// A program, ready to be verified and run.
 #[derive(Debug, Clone, Default)]
 pub struct Program {
@@ -108,4 +168,52 @@ pub struct Program {
     pub globals: Vec<Global>,
     /// Block instances with resources, in order of their offsets.
     pub resources: Vec<ResourceInstance>,
+    /// Classes.
+    pub classes: Vec<Class>,
+    /// What instances of classes stand where at the start.
+    pub instances: Vec<Instances>,
+    /// Methods that are found by class.
+    pub dispatch: Vec<Dispatch>,
+    /// Types that are asked for at run time.
+    pub families: Vec<Family>,
+    /// The heap of `__NEW`: first byte and bytes (16 · 2ⁿ, or 0).
+    pub heap: (u32, u32),
+}
+
+impl Program {
+    /// A class by its number.
+    pub fn class(&self, number: u32) -> Option<&Class> {
+        self.classes.get(number.checked_sub(1)? as usize)
+    }
+    /// The numbers of the bodies that a body may call, with repetitions.
+    pub fn callees(&self, body: &Body) -> Vec<usize> {
+        let mut found = Vec::new();
+        for inst in body.blocks.iter().flat_map(|block| &block.insts) {
+            match inst {
+                Inst::Call { body, .. } => found.push(body.0 as usize),
+                Inst::Virtual { method, .. } => {
+                    let targets = self.dispatch.get(*method as usize).map_or(&[][..], |method| &method.targets);
+                    found.extend(targets.iter().flatten().map(|body| body.0 as usize));
+                }
+                _ => {}
+            }
+        }
+        found
+    }
+    /// The table of instances as it is at the start; empty without classes.
+    pub fn instances(&self) -> Classes {
+        if self.classes.is_empty() {
+            return Classes::default();
+        }
+        let table = Classes::new(self.image_size.into());
+        for run in &self.instances {
+            let stride = self.class(run.class).map_or(GRANULE, |class| class.size.into());
+            table.put(run.offset.into(), run.class, stride, run.count.into());
+        }
+        table
+    }
+    /// The heap as it is at the start.
+    pub fn heap(&self) -> Heap {
+        Heap::new(self.heap.0, self.heap.1)
+    }
 }

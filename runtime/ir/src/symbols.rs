@@ -212,7 +212,7 @@ impl Walk<'_> {
     fn member(&mut self, name: &str) -> Result<(), SymbolError> {
         let structure = match self.types.get(self.ty) {
             Type::Struct(structure) => structure,
-            Type::Pointer(_) | Type::Reference(_) => return Err(SymbolError::Indirect { within: self.name.clone() }),
+            Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) => return Err(SymbolError::Indirect { within: self.name.clone() }),
             _ => return Err(SymbolError::NotStructure { within: self.name.clone(), ty: self.types.name(self.ty) }),
         };
         let Some(field) = structure.fields.iter().find(|f| same(&f.name, name)) else {

@@ -5,7 +5,7 @@ use crate::parse::parse_program;
 use crate::program::{Native, Program};
 use crate::text;
 use crate::verify::verify;
-use takt_abi::{Context, Env, Fault, NoHost, Resources, TRACE_DEPTH, Time};
+use takt_abi::{Context, Env, Fault, NoHost, Time};
 
 /// Finds the natives of this crate.
 pub(crate) fn natives(name: &str) -> Option<Native> {
@@ -47,34 +47,13 @@ pub(crate) fn run(program: &Program) -> Outcome {
 pub(crate) fn run_with(program: &Program, body: u32, fuel: i64, flag: u32) -> Outcome {
     let mut image = program.init.clone();
     image.resize(program.image_size as usize, 0);
-    let mut env = Env {
-        now: Time(0),
-        period: Time(1),
-        task: 0,
-        cycle: 0,
-        bus_task: 0,
-        bus_period: Time(1),
-        resources: Resources::default(),
-        host: Box::new(NoHost),
-    };
+    let mut env = Env::new(Time(1), Box::new(NoHost));
+    (env.classes, env.heap) = (program.instances(), program.heap());
     let quarter = program.image_size / 4;
     let (start, len) = program.tasks.first().map_or((program.image_size - quarter, quarter), |t| t.stack);
-    let mut ctx = Context {
-        flag: flag.into(),
-        fault_code: 0,
-        fuel,
-        fault_site: 0,
-        trace_len: 0,
-        fault_facts: [0; 3],
-        depth: 0,
-        depth_limit: 20,
-        image: image.as_mut_ptr(),
-        image_size: image.len() as u64,
-        stack_end: u64::from(start) + u64::from(len),
-        poll: watchdog,
-        trace: [0; TRACE_DEPTH],
-        env: &mut env,
-    };
+    let mut ctx = Context::new(image.as_mut_ptr(), image.len() as u64, &mut env, watchdog);
+    (ctx.flag, ctx.fuel, ctx.depth_limit, ctx.fault_site) = (flag.into(), fuel, 20, 0);
+    ctx.stack_end = u64::from(start) + u64::from(len);
     let mut interpreter = Interpreter::new(program);
     let code = interpreter.run(program, crate::BodyId(body), start.into(), &mut ctx);
     assert_eq!(code, ctx.fault_code);
@@ -104,6 +83,12 @@ data "68616c6c6f00"
 init 80 at 64 "0a00feff"
 native STR_ASSIGN
 native STR_COMPARE
+class "Base" size 16
+class "Derived" size 32
+instances 2 at 224 count 1
+method "Base.M" (i64) -> i64 from 1 [3, 4]
+family "Derived" from 2 [1]
+heap 32 16
 type INT
 type struct "Point" size 16 align 8 { state "x" 0 at 0, inout "y" 0 at 8 doc "mm" }
 type array 1 [0..1, -1..1]
@@ -115,14 +100,15 @@ type open 0 2
 type reference 3
 type wstring 7
 type LREAL
+type interface "I_Base"
 global "GVL.x" type 0 at 64 bare
 global "GVL.p" type 2 at 96 constant doc "where it is"
 task "Main" cyclic 1000000 priority 0 entry 0 stack 256 128
 task "Slow" event 64 priority 1 entry 0 stack 384 128
 start 0
-body "PLC_PRG" () frame 16 @0
+body "PLC_PRG" () frame 32 @0
   local i64, f64, f32, addr:2, i64, addr:8, i64, i64
-b0:
+b0 catch b3:
   v0 = const 3
   v1 = const.f64 1.5
   v2 = const.f32 -0.25
@@ -159,6 +145,14 @@ b1:
   branch v4, b1, b2
 b2:
   native STR_COMPARE(v6, v7, v6, v7) @2
+  place frame+16 class 1 count 1
+  v6 = const 224
+  v7 = virtual 0 v6(v4) @1
+  v7 = isa v6 0
+  v6 = guard
+  return
+b3:
+  v4 = catch v6
   return
 body "Count" (i64, addr:8) -> i64 frame 16 @3
   local i64
@@ -185,6 +179,13 @@ b1:
   return v1
 b2:
   return v0
+body "Base.M" (addr:16, i64) -> i64 @3
+b0:
+  return v1
+body "Derived.M" (addr:32, i64) -> i64 @4
+b0:
+  store.i64 v0+24, v1
+  return v1
 "#;
 
 #[track_caller]

@@ -59,22 +59,13 @@ takt_abi::native_fn! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_abi::{Env, NoHost, Resources, Time};
+    use takt_abi::{Env, NoHost, Time};
 
     /// Runs on 64 bytes that hold `text` at 16.
     fn with<T>(text: &[u8], run: impl FnOnce(&mut Cx<'_>) -> T) -> (T, Vec<u8>, i64) {
         let mut image = vec![0xEE; 64];
         image[16..16 + text.len()].copy_from_slice(text);
-        let mut env = Env {
-            now: Time(0),
-            period: Time(1),
-            task: 0,
-            cycle: 0,
-            bus_task: 0,
-            bus_period: Time(1),
-            resources: Resources::default(),
-            host: Box::new(NoHost),
-        };
+        let mut env = Env::new(Time(1), Box::new(NoHost));
         let mut fuel = 100;
         let result = run(&mut Cx::new(&mut image, &mut env, &mut fuel, 0));
         (result, image, fuel)

@@ -91,6 +91,8 @@ pub enum Type {
     Pointer(TypeId),
     /// REFERENCE TO.
     Reference(TypeId),
+    /// INTERFACE, by its name: 8 bytes, the offset of an instance that implements it.
+    Interface(Box<str>),
     /// Subrange.
     Subrange {
         /// Base type.
@@ -152,7 +154,7 @@ impl Types {
             Type::OpenArray { dims, .. } => (8 + 16 * dims, 8),
             Type::Struct(s) => (s.size, s.align.max(1)),
             Type::Enum(e) => (elem_size(e.base), elem_size(e.base)),
-            Type::Pointer(_) | Type::Reference(_) => (8, 8),
+            Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) => (8, 8),
             Type::Subrange { base, .. } => (elem_size(*base), elem_size(*base)),
             Type::Error => (1, 1),
         }
@@ -178,6 +180,7 @@ impl Types {
             Type::Enum(e) => e.name.clone(),
             Type::Pointer(t) => format!("POINTER TO {}", self.name(*t)),
             Type::Reference(t) => format!("REFERENCE TO {}", self.name(*t)),
+            Type::Interface(name) => name.to_string(),
             Type::Subrange { base, low, high } => format!("{}({low}..{high})", elem_name(*base)),
             Type::Error => "?".into(),
         }

@@ -25,7 +25,7 @@ pub fn read_scalar(types: &Types, ty: TypeId, bytes: &[u8]) -> Option<Scalar> {
     Some(match types.get(ty) {
         Type::Elem(elem) | Type::Subrange { base: elem, .. } => read_elem(*elem, bytes)?,
         Type::Enum(enumeration) => read_elem(enumeration.base, bytes)?,
-        Type::Pointer(_) | Type::Reference(_) => Scalar::Int(word(bytes, 8)?.into()),
+        Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) => Scalar::Int(word(bytes, 8)?.into()),
         Type::String(n) => Scalar::Text(String::from_utf8_lossy(string_bytes(bytes, *n)?).into_owned()),
         Type::WString(n) => Scalar::Text(String::from_utf16_lossy(&string_units(bytes, *n)?)),
         Type::Array { .. } | Type::OpenArray { .. } | Type::Struct(_) | Type::Error => return None,
@@ -94,7 +94,7 @@ fn put(types: &Types, ty: TypeId, bytes: &[u8], out: &mut String) -> Option<()> 
             }
             out.push(')');
         }
-        Type::Pointer(_) | Type::Reference(_) | Type::OpenArray { .. } => put_hex(bytes, 8, out)?,
+        Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) | Type::OpenArray { .. } => put_hex(bytes, 8, out)?,
         Type::Error => return None,
     }
     Some(())

@@ -12,6 +12,7 @@ use crate::program::{NULL_ZONE, Program, Trigger};
 
 mod body;
 mod calls;
+mod classes;
 mod flow;
 mod layout;
 
@@ -108,6 +109,16 @@ pub enum Defect {
     Global(usize),
     /// Resources not in rising order of their offsets, or outside the image.
     Resources,
+    /// A class that the program does not have, whose size is no multiple of the granule, or whose instances leave their place.
+    Class(u32),
+    /// A method that the program does not have, or whose bodies do not take its parameters and an instance of their class.
+    Method(u32),
+    /// A family that the program does not have.
+    Family(u32),
+    /// A heap that leaves the image or overlaps the stack region of a task, or is not 16 · 2ⁿ bytes long.
+    Heap,
+    /// A handler that does not begin with [`crate::Inst::Catch`], or one of these anywhere else.
+    Handler,
 }
 
 impl std::fmt::Display for Defect {
@@ -137,6 +148,11 @@ impl std::fmt::Display for Defect {
             Self::Stack(n) => write!(f, "the stack region of task {n} leaves the image or overlaps another"),
             Self::Trigger(n) => write!(f, "the trigger of task {n} is impossible"),
             Self::Global(n) => write!(f, "variable {n} leaves the image"),
+            Self::Class(n) => write!(f, "class {n} is missing, or its instances leave their place"),
+            Self::Method(n) => write!(f, "method {n} is missing, or one of its bodies takes other parameters"),
+            Self::Family(n) => write!(f, "there is no family {n}"),
+            Self::Heap => write!(f, "the heap leaves the image, overlaps a stack region or has no possible size"),
+            Self::Handler => write!(f, "a fault is caught where no handler begins, or a handler does not catch it"),
             Self::Resources => write!(f, "resources are not in rising order or leave the image"),
         }
     }
@@ -167,6 +183,7 @@ pub fn verify(program: &Program) -> Result<(), VerifyError> {
     tables(program)?;
     layout::check(program)?;
     tasks(program)?;
+    classes::check(program)?;
     for id in 0..program.bodies.len() {
         body::check(program, BodyId(id as u32))?;
     }

@@ -4,6 +4,7 @@
 //! result. Locals are Cranelift variables; an address is a machine address. What can fail branches to a cold block at the end of the function, one for
 //! each kind of fault, that calls [`crate::runtime`] and returns its code.
 
+mod dispatch;
 mod flow;
 mod memory;
 mod operator;
@@ -17,7 +18,8 @@ use cranelift_codegen::ir::{
 };
 use cranelift_codegen::isa::{CallConv, TargetIsa};
 use cranelift_frontend::{FunctionBuilder, Variable};
-use takt_ir::{Body, Const, Inst, Local, Program, SiteId, Ty};
+use takt_abi::Fault;
+use takt_ir::{BlockId, Body, Const, Inst, Local, Program, SiteId, Ty};
 
 /// The signature of a body with parameters and result of these types.
 pub(crate) fn signature(params: &[Ty], result: Option<Ty>) -> Signature {
@@ -38,12 +40,12 @@ fn register(ty: Ty) -> Type {
     }
 }
 
-/// Fills the function of `builder` with `body`. `pool` is the address of the program's constants.
-pub(crate) fn lower(program: &Program, body: &Body, builder: FunctionBuilder<'_>, isa: &dyn TargetIsa, pool: usize, defect: Defect) {
-    let mut lowering = Lowering::new(program, body, builder, isa, pool, defect);
+/// Fills the function of `builder` with `body`.
+pub(crate) fn lower(program: &Program, body: &Body, builder: FunctionBuilder<'_>, isa: &dyn TargetIsa, tables: &Tables, defect: Defect) {
+    let mut lowering = Lowering::new(program, body, builder, isa, tables, defect);
     lowering.enter();
     for (i, block) in body.blocks.iter().enumerate() {
-        lowering.open(i);
+        lowering.open(i, block.handler);
         for inst in &block.insts {
             lowering.inst(inst);
         }
@@ -54,13 +56,28 @@ pub(crate) fn lower(program: &Program, body: &Body, builder: FunctionBuilder<'_>
     lowering.b.finalize(isa.frontend_config());
 }
 
-/// The kinds of faults, each with one cold block. Its first parameter is the site.
+/// Tables of the program that machine code reads, by address.
+#[derive(Debug)]
+pub(crate) struct Tables {
+    /// Constant bytes.
+    pub(crate) pool: usize,
+    /// Addresses of the bodies of all methods, one row behind the other.
+    pub(crate) rows: usize,
+    /// Where the row of each method starts.
+    pub(crate) starts: Vec<usize>,
+    /// [`takt_ir::Family`]s.
+    pub(crate) families: usize,
+}
+
+/// The kinds of faults, each with one cold block per handler. Its first parameter is the site.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cold {
     /// value, low, high.
     Index,
     /// offset, size.
     Pointer,
+    /// offset.
+    Instance,
     Division,
     Overflow,
     /// code.
@@ -70,12 +87,12 @@ enum Cold {
 }
 
 impl Cold {
-    const ALL: [Self; 6] = [Self::Index, Self::Pointer, Self::Division, Self::Overflow, Self::Stopped, Self::Caller];
     /// Types behind the site.
     fn params(self) -> &'static [Type] {
         match self {
             Self::Index => &[types::I64, types::I64, types::I64],
             Self::Pointer => &[types::I64, types::I64],
+            Self::Instance => &[types::I64],
             Self::Division | Self::Overflow => &[],
             Self::Stopped | Self::Caller => &[types::I32],
         }
@@ -85,6 +102,7 @@ impl Cold {
         match self {
             Self::Index => runtime::index as *const u8 as usize,
             Self::Pointer => runtime::pointer as *const u8 as usize,
+            Self::Instance => runtime::instance as *const u8 as usize,
             Self::Division => runtime::division as *const u8 as usize,
             Self::Overflow => runtime::overflow as *const u8 as usize,
             Self::Stopped => runtime::stopped as *const u8 as usize,
@@ -100,7 +118,7 @@ struct Lowering<'a, 'f> {
     defect: Defect,
     /// The calling convention of Rust's `extern "C"`.
     host: CallConv,
-    pool: usize,
+    tables: &'a Tables,
     ctx: Value,
     image: Value,
     frame: Value,
@@ -108,7 +126,9 @@ struct Lowering<'a, 'f> {
     blocks: Vec<ir::Block>,
     /// Branches to each block that have not been made yet; at 0 it is sealed.
     missing: Vec<usize>,
-    cold: [Option<ir::Block>; 6],
+    /// Where a fault in the block under way leads.
+    handler: Option<BlockId>,
+    cold: Vec<(Cold, Option<BlockId>, ir::Block)>,
     /// Words of native calls.
     words: Option<StackSlot>,
     callees: Vec<(u32, FuncRef)>,
@@ -118,7 +138,14 @@ struct Lowering<'a, 'f> {
 }
 
 impl<'a, 'f> Lowering<'a, 'f> {
-    fn new(program: &'a Program, body: &'a Body, mut b: FunctionBuilder<'f>, isa: &dyn TargetIsa, pool: usize, defect: Defect) -> Self {
+    fn new(
+        program: &'a Program,
+        body: &'a Body,
+        mut b: FunctionBuilder<'f>,
+        isa: &dyn TargetIsa,
+        tables: &'a Tables,
+        defect: Defect,
+    ) -> Self {
         let mut flags = |user_id: u32, description: &'static str| {
             let region = b.func.dfg.alias_regions.insert(AliasRegionData { user_id, description: description.into() });
             MemFlagsData::new().with_notrap().with_alias_region(Some(region))
@@ -133,24 +160,25 @@ impl<'a, 'f> Lowering<'a, 'f> {
         let (ctx, image, frame) = (b.block_params(entry)[0], b.block_params(entry)[1], b.block_params(entry)[2]);
         let mut missing = vec![0; body.blocks.len()];
         missing[0] = 1;
-        for target in body.blocks.iter().flat_map(|block| flow::targets(&block.term)) {
+        for target in body.blocks.iter().flat_map(|block| flow::targets(&block.term).into_iter().chain(block.handler)) {
             missing[target.0 as usize] += 1;
         }
         let host = isa.default_call_conv();
-        let (cold, words, callees, signatures) = ([None; 6], None, Vec::new(), Vec::new());
+        let (cold, words, callees, signatures) = (Vec::new(), None, Vec::new(), Vec::new());
         Self {
             program,
             body,
             b,
             defect,
             host,
-            pool,
+            tables,
             ctx,
             image,
             frame,
             locals,
             blocks,
             missing,
+            handler: None,
             cold,
             words,
             callees,
@@ -263,6 +291,11 @@ impl<'a, 'f> Lowering<'a, 'f> {
             Inst::Data { dst, offset, data, len } => self.data((*dst, *offset), *data, *len),
             Inst::Call { body, args, dst, site } => self.call(*body, args, *dst, *site),
             Inst::Native { native, args, dst, site } => self.native(*native, args, *dst, *site),
+            Inst::Virtual { method, this, args, dst, site } => self.call_virtual(*method, *this, args, *dst, *site),
+            Inst::IsA { dst, pointer, family } => self.is_a(*dst, *pointer, *family),
+            Inst::Place { offset, class, count } => self.put_instances(*offset, *class, *count),
+            Inst::Guard { dst } => self.guard(*dst),
+            Inst::Catch { dst, depth } => self.catch(*dst, *depth),
             Inst::Poll { cost, site } => self.poll(*cost, *site),
         }
     }
@@ -284,7 +317,8 @@ impl<'a, 'f> Lowering<'a, 'f> {
         self.b.seal_block(next);
     }
     fn cold_target(&mut self, kind: Cold, site: SiteId, facts: &[Value]) -> (ir::Block, Vec<BlockArg>) {
-        let block = match self.cold[kind as usize] {
+        let known = self.cold.iter().find(|(k, handler, _)| *k == kind && *handler == self.handler).map(|(.., block)| *block);
+        let block = match known {
             Some(block) => block,
             None => {
                 let block = self.b.create_block();
@@ -293,7 +327,7 @@ impl<'a, 'f> Lowering<'a, 'f> {
                 for ty in kind.params() {
                     self.b.append_block_param(block, *ty);
                 }
-                self.cold[kind as usize] = Some(block);
+                self.cold.push((kind, self.handler, block));
                 block
             }
         };
@@ -302,8 +336,7 @@ impl<'a, 'f> Lowering<'a, 'f> {
     }
     /// Fills the cold blocks that were used.
     fn cold_blocks(&mut self) {
-        for kind in Cold::ALL {
-            let Some(block) = self.cold[kind as usize] else { continue };
+        for (kind, handler, block) in std::mem::take(&mut self.cold) {
             self.b.switch_to_block(block);
             let mut args = vec![self.ctx];
             args.extend_from_slice(self.b.block_params(block));
@@ -312,8 +345,21 @@ impl<'a, 'f> Lowering<'a, 'f> {
                 continue;
             }
             let code = self.call_host(kind.address(), &args, Some(types::I32));
-            self.leave(code);
+            self.fail(code, handler);
         }
+    }
+    /// Goes to the handler if there is one and the fault is one that a program may handle; otherwise back to the caller.
+    fn fail(&mut self, code: Value, handler: Option<BlockId>) {
+        let Some(handler) = handler.filter(|_| !self.is(Defect::HandlerIgnored)) else { return self.leave(code) };
+        let catchable = (0..32).filter(|code| Fault::catchable(*code)).fold(0i64, |mask, code| mask | 1 << code);
+        let mask = self.b.ins().iconst(types::I32, catchable);
+        let shifted = self.b.ins().ushr(mask, code);
+        let caught = self.b.ins().band_imm_u(shifted, 1);
+        let next = self.b.create_block();
+        self.b.set_cold_block(next);
+        self.b.ins().brif(caught, self.blocks[handler.0 as usize], &[], next, &[]);
+        self.b.switch_to_block(next);
+        self.leave(code);
     }
     /// Returns the code of a fault.
     fn leave(&mut self, code: Value) {

@@ -1,5 +1,6 @@
 //! Compiled programs: from IR to memory that can be run, and the way in.
 
+use crate::body::Tables;
 use crate::defect::Defect;
 use crate::machine::{self, Compiled};
 use crate::stack::StackUse;
@@ -51,7 +52,10 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
     takt_ir::verify(program).map_err(JitError::Verify)?;
     let isa = machine::host()?;
     let pool: Box<[u8]> = program.data.clone().into_boxed_slice();
-    let mut functions = machine::bodies(program, &*isa, pool.as_ptr() as usize, defect)?;
+    let families = program.families.clone().into_boxed_slice();
+    let mut rows: Box<[usize]> = program.dispatch.iter().flat_map(|method| &method.targets).map(|_| 0).collect();
+    let tables = tables(program, &pool, &rows, &families);
+    let mut functions = machine::bodies(program, &*isa, &tables, defect)?;
     let frames: Vec<usize> = functions.iter().map(|f| f.frame).collect();
     // The bodies keep their numbers; behind them stand the slow path of polls and the ways in.
     functions.push(machine::slow_poll(&*isa, FuncId::from_u32(functions.len() as u32))?);
@@ -64,6 +68,9 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
     }
     let size = functions.iter().map(|f| f.bytes.len()).sum();
     let (module, addresses) = link(isa, &functions)?;
+    for (row, target) in rows.iter_mut().zip(program.dispatch.iter().flat_map(|method| &method.targets)) {
+        *row = target.map_or(0, |body| addresses[body.0 as usize]);
+    }
     let bodies = program.bodies.iter().zip(&addresses).map(|(body, &address)| {
         let way = ways.iter().find(|(result, _)| enterable(body) && *result == body.result);
         Entry { address, by: way.map(|(_, i)| addresses[*i]), site: body.entry_site.0 }
@@ -76,7 +83,19 @@ pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError>
         stack: StackUse::new(program, &frames),
         module: Mutex::new(Some(module)),
         _pool: pool,
+        _rows: rows,
+        _families: families,
+        classes: !program.classes.is_empty(),
     })
+}
+
+/// Where machine code finds the tables; they are boxed and do not move.
+fn tables(program: &Program, pool: &[u8], rows: &[usize], families: &[takt_ir::Family]) -> Tables {
+    let starts = program.dispatch.iter().scan(0, |start, method| {
+        *start += method.targets.len();
+        Some(*start - method.targets.len())
+    });
+    Tables { pool: pool.as_ptr() as usize, rows: rows.as_ptr() as usize, starts: starts.collect(), families: families.as_ptr() as usize }
 }
 
 /// Whether a body can be run from outside: without parameters, with a result that is a value.
@@ -129,6 +148,12 @@ pub struct Code {
     module: Mutex<Option<JITModule>>,
     /// Constants, at a fixed address; machine code reads them.
     _pool: Box<[u8]>,
+    /// Addresses of the bodies of methods, likewise.
+    _rows: Box<[usize]>,
+    /// Types that are asked for at run time, likewise.
+    _families: Box<[takt_ir::Family]>,
+    /// Whether a context must have a table of instances.
+    classes: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -166,7 +191,12 @@ impl Code {
         let Some((entry, by)) = self.bodies.get(body.0 as usize).and_then(|e| Some((e, e.by?))) else {
             return Err(ctx.fail(Fault::Panic, 0));
         };
-        let fits = ctx.image_size == self.image_size && frame <= ctx.image_size && ctx.stack_end <= ctx.image_size && !ctx.image.is_null();
+        let table = !self.classes || !ctx.classes.is_null();
+        let fits = table
+            && ctx.image_size == self.image_size
+            && frame <= ctx.image_size
+            && ctx.stack_end <= ctx.image_size
+            && !ctx.image.is_null();
         if !fits {
             return Err(ctx.fail(Fault::Panic, entry.site));
         }

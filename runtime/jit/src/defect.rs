@@ -113,6 +113,14 @@ defects! {
     SwitchDefault,
     /// Branches look at the low byte of their condition only.
     BranchByte,
+    /// A fault passes its handler.
+    HandlerIgnored,
+    /// The depth of calls stays what it was where the fault happened.
+    DepthLeft,
+    /// A handler finds 0 instead of the number of the fault.
+    CodeLost,
+    /// Everything is of every family.
+    FamilyAlways,
     /// Locals that were never written hold 1.
     LocalsDirty,
 }

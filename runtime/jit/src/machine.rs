@@ -1,6 +1,6 @@
 //! The processor that code is made for, and the threads that make it.
 
-use crate::body;
+use crate::body::{self, Tables};
 use crate::code::JitError;
 use crate::defect::Defect;
 use crate::place;
@@ -49,13 +49,13 @@ pub(crate) fn host() -> Result<OwnedTargetIsa, JitError> {
 }
 
 /// Machine code of all bodies, in order.
-pub(crate) fn bodies(program: &Program, isa: &dyn TargetIsa, pool: usize, defect: Defect) -> Result<Vec<Compiled>, JitError> {
+pub(crate) fn bodies(program: &Program, isa: &dyn TargetIsa, tables: &Tables, defect: Defect) -> Result<Vec<Compiled>, JitError> {
     let count = program.bodies.len();
     let size: usize = program.bodies.iter().flat_map(|b| &b.blocks).map(|b| b.insts.len() + 1).sum();
     let threads = if size < PARALLEL { 1 } else { std::thread::available_parallelism().map_or(1, |n| n.get().min(8)) };
     let share = |first: usize| -> Vec<(usize, Result<Compiled, JitError>)> {
         let mut maker = Maker::new(isa);
-        (first..count).step_by(threads).map(|i| (i, maker.body(program, i, pool, defect))).collect()
+        (first..count).step_by(threads).map(|i| (i, maker.body(program, i, tables, defect))).collect()
     };
     let mut all: Vec<(usize, Result<Compiled, JitError>)> = if threads == 1 {
         share(0)
@@ -141,12 +141,12 @@ impl<'a> Maker<'a> {
     fn new(isa: &'a dyn TargetIsa) -> Self {
         Self { isa, context: Context::new(), builder: FunctionBuilderContext::new() }
     }
-    fn body(&mut self, program: &Program, i: usize, pool: usize, defect: Defect) -> Result<Compiled, JitError> {
+    fn body(&mut self, program: &Program, i: usize, tables: &Tables, defect: Defect) -> Result<Compiled, JitError> {
         let ours = &program.bodies[i];
         let signature = body::signature(&ours.locals[..ours.params as usize], ours.result);
         self.context.func = Function::with_name_signature(UserFuncName::user(0, i as u32), signature);
         let b = FunctionBuilder::new(&mut self.context.func, &mut self.builder);
-        body::lower(program, ours, b, self.isa, pool, defect);
+        body::lower(program, ours, b, self.isa, tables, defect);
         self.emit(&ours.name, FuncId::from_u32(i as u32))
     }
     fn emit(&mut self, name: &str, id: FuncId) -> Result<Compiled, JitError> {

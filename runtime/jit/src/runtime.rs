@@ -19,6 +19,26 @@ pub(crate) unsafe extern "C" fn pointer(ctx: *mut Context, site: u32, offset: u6
     unsafe { &mut *ctx }.fail(fault, site)
 }
 
+/// Fault `NullPointer` or `NoInstance`, by the offset.
+pub(crate) unsafe extern "C" fn instance(ctx: *mut Context, site: u32, offset: u64) -> u32 {
+    let fault = if offset == 0 { Fault::NullPointer } else { Fault::NoInstance { offset } };
+    // SAFETY: as in `index`.
+    unsafe { &mut *ctx }.fail(fault, site)
+}
+
+/// Whether the instance at `offset` belongs to a family.
+pub(crate) unsafe extern "C" fn is_a(ctx: *mut Context, offset: u64, family: *const takt_ir::Family) -> u64 {
+    // SAFETY: the environment lives as long as the context, the family as long as the code that asks.
+    let (classes, family) = unsafe { (&(*(*ctx).env).classes, &*family) };
+    family.has(classes.at(offset)).into()
+}
+
+/// Notes instances in a frame.
+pub(crate) unsafe extern "C" fn put_instances(ctx: *mut Context, offset: u64, class: u32, stride: u64, count: u64) {
+    // SAFETY: as in `is_a`.
+    unsafe { &(*(*ctx).env).classes }.put(offset, class, stride, count);
+}
+
 /// Fault `DivisionByZero`.
 pub(crate) unsafe extern "C" fn division(ctx: *mut Context, site: u32) -> u32 {
     // SAFETY: as in `index`.

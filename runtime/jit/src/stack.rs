@@ -3,7 +3,7 @@
 //! A chain of calls holds each body outside cycles at most once, and bodies of cycles at most as often as the depth limit allows: each of their
 //! entries is counted.
 
-use takt_ir::{Inst, Program};
+use takt_ir::Program;
 
 /// What is added for native functions, polls and the way in, bytes.
 pub const NATIVE_STACK: usize = 256 * 1024;
@@ -29,15 +29,10 @@ impl StackUse {
     }
 }
 
-fn callees(program: &Program, body: usize) -> impl Iterator<Item = usize> + '_ {
-    let insts = program.bodies[body].blocks.iter().flat_map(|block| &block.insts);
-    insts.filter_map(|inst| if let Inst::Call { body, .. } = inst { Some(body.0 as usize) } else { None })
-}
-
 /// The longest path through the graph of calls, where bodies of cycles weigh nothing: relaxed until nothing changes. The number of rounds is bounded
 /// for a graph whose cycles were not all marked.
 fn longest_chain(program: &Program, frames: &[usize]) -> usize {
-    let calls: Vec<Vec<usize>> = (0..frames.len()).map(|body| callees(program, body).collect()).collect();
+    let calls: Vec<Vec<usize>> = program.bodies.iter().map(|body| program.callees(body)).collect();
     let mut below = vec![0; frames.len()];
     for _ in 0..=frames.len() {
         let mut changed = false;

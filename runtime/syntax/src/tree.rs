@@ -158,7 +158,7 @@ pub struct Property {
     pub ty: TypeExpr,
     /// GET: declarations and statements.
     pub get: Option<(Vec<VarBlock>, Vec<Stmt>)>,
-    /// SET: declarations and statements.
+    /// SET: declarations and statements. The first block is an input with the name and type of the property: the new value.
     pub set: Option<(Vec<VarBlock>, Vec<Stmt>)>,
     /// Whole.
     pub span: Span,

@@ -62,6 +62,8 @@ pub struct Manifest {
     pub arithmetic: Arithmetic,
     /// Lossy implicit conversions are errors.
     pub strict: bool,
+    /// Bytes of the heap of `__NEW`; 0 if not given.
+    pub heap: u32,
     /// The task that owns the bus, if named.
     pub bus_task: Option<Located<String>>,
     /// Axes in the order of the manifest.
@@ -123,6 +125,7 @@ fn project(table: &mut Table<'_, '_>, manifest: &mut Manifest) {
     manifest.sources = table.strings("sources").unwrap_or_default();
     manifest.arithmetic = table.choice("arithmetic", &[("codesys", Arithmetic::Codesys), ("iec", Arithmetic::Iec)]).unwrap_or_default();
     manifest.strict = table.boolean("strict").unwrap_or(false);
+    manifest.heap = table.number("heap", 16.0..=1073741824.0).map_or(0, |bytes| bytes as u32);
 }
 
 fn wires(table: &mut Table<'_, '_>, wires: &mut Vec<Wire>) {

@@ -1,6 +1,6 @@
 //! For tests: an image and an engine's side for blocks, and the smallest axis stage.
 
-use takt_abi::{AxisRef, AxisState, Bool, Cx, Env, Fault, InOut, NoHost, OpenArray, Plain, Resources, Time};
+use takt_abi::{AxisRef, AxisState, Bool, Cx, Env, Fault, InOut, NoHost, OpenArray, Plain, Time};
 
 /// An image and what stands beside it.
 pub struct Bench {
@@ -13,16 +13,7 @@ pub struct Bench {
 impl Bench {
     /// An image of so many bytes.
     pub fn new(size: usize) -> Self {
-        let env = Env {
-            now: Time(0),
-            period: Time::from_millis(1),
-            task: 0,
-            cycle: 0,
-            bus_task: 0,
-            bus_period: Time::from_millis(1),
-            resources: Resources::default(),
-            host: Box::new(NoHost),
-        };
+        let env = Env::new(Time::from_millis(1), Box::new(NoHost));
         Self { image: vec![0; size], env }
     }
     /// Calls a body as the instance at `this`.

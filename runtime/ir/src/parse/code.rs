@@ -28,13 +28,14 @@ pub(super) fn parse(cursor: &mut Cursor<'_>, program: &Program) -> Result<Body, 
         if number as usize != blocks.len() {
             return Err(cursor.wrong_last(&format!("expected block `b{}`", blocks.len())));
         }
+        let handler = if cursor.accept("catch") { Some(target(cursor)?) } else { None };
         cursor.expect(":")?;
-        blocks.push(block(cursor, program)?);
+        blocks.push(Block { handler, ..block(cursor, program)? });
     }
     Ok(Body { name, params, locals, result, blocks, frame_size, recursive, entry_site })
 }
 
-fn ty(cursor: &mut Cursor<'_>) -> Result<Ty, ParseError> {
+pub(super) fn ty(cursor: &mut Cursor<'_>) -> Result<Ty, ParseError> {
     Ok(match cursor.word()? {
         "i64" => Ty::I64,
         "f32" => Ty::F32,
@@ -81,7 +82,7 @@ fn block(cursor: &mut Cursor<'_>, program: &Program) -> Result<Block, ParseError
             cursor.expect("=")?;
             insts.push(assignment(cursor, program, dst)?);
         } else if let Some(term) = term(cursor)? {
-            return Ok(Block { insts, term });
+            return Ok(Block { insts, term, handler: None });
         } else {
             insts.push(statement(cursor, program)?);
         }
@@ -108,6 +109,10 @@ fn assignment(cursor: &mut Cursor<'_>, program: &Program, dst: Local) -> Result<
         "deref" => Inst::Deref { dst, pointer: local(cursor)?, site: site(cursor)? },
         "call" => call(cursor, Some(dst))?,
         "native" => native(cursor, program, Some(dst))?,
+        "virtual" => virtual_call(cursor, Some(dst))?,
+        "isa" => Inst::IsA { dst, pointer: local(cursor)?, family: cursor.number()? },
+        "guard" => Inst::Guard { dst },
+        "catch" => Inst::Catch { dst, depth: local(cursor)? },
         _ => match word.strip_prefix("load.") {
             Some(name) => {
                 let mem = mem(cursor, name)?;
@@ -177,6 +182,14 @@ fn statement(cursor: &mut Cursor<'_>, program: &Program) -> Result<Inst, ParseEr
         }
         "call" => call(cursor, None)?,
         "native" => native(cursor, program, None)?,
+        "virtual" => virtual_call(cursor, None)?,
+        "place" => {
+            let (_, offset) = place(cursor)?;
+            cursor.expect("class")?;
+            let class = cursor.number()?;
+            cursor.expect("count")?;
+            Inst::Place { offset, class, count: cursor.number()? }
+        }
         "poll" => Inst::Poll { cost: cursor.number()?, site: site(cursor)? },
         _ => match word.strip_prefix("store.") {
             Some(name) => {
@@ -194,6 +207,12 @@ fn call(cursor: &mut Cursor<'_>, dst: Option<Local>) -> Result<Inst, ParseError>
     let body = BodyId(cursor.number()?);
     cursor.expect("(")?;
     Ok(Inst::Call { body, args: cursor.list(")", local)?, dst, site: site(cursor)? })
+}
+
+fn virtual_call(cursor: &mut Cursor<'_>, dst: Option<Local>) -> Result<Inst, ParseError> {
+    let (method, this) = (cursor.number()?, local(cursor)?);
+    cursor.expect("(")?;
+    Ok(Inst::Virtual { method, this, args: cursor.list(")", local)?, dst, site: site(cursor)? })
 }
 
 fn native(cursor: &mut Cursor<'_>, program: &Program, dst: Option<Local>) -> Result<Inst, ParseError> {
@@ -251,6 +270,7 @@ fn fault(cursor: &mut Cursor<'_>) -> Result<Fault, ParseError> {
         "wild-pointer" => Fault::WildPointer { offset: cursor.number()?, size: cursor.number()? },
         "stack-overflow" => Fault::StackOverflow { depth: cursor.number()? },
         "block" => Fault::Block { error: cursor.number()? },
+        "no-instance" => Fault::NoInstance { offset: cursor.number()? },
         other => {
             let plain = [Fault::DivisionByZero, Fault::NullPointer, Fault::Watchdog, Fault::Panic, Fault::WrongDelete, Fault::Stopped];
             let found = plain.into_iter().find(|fault| fault.name() == other);

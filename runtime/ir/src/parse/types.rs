@@ -29,6 +29,7 @@ pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Type, ParseError> {
             Type::Enum(Box::new(Enumeration { name, base, members: cursor.list("}", member)? }))
         }
         "pointer" => Type::Pointer(TypeId(cursor.number()?)),
+        "interface" => Type::Interface(cursor.text()?.into()),
         "reference" => Type::Reference(TypeId(cursor.number()?)),
         "subrange" => {
             let base = elem(cursor)?;

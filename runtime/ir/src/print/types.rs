@@ -34,6 +34,7 @@ pub(super) fn print(types: &Types, out: &mut String) -> fmt::Result {
             }
             Type::Pointer(target) => write!(out, "pointer {}", target.0)?,
             Type::Reference(target) => write!(out, "reference {}", target.0)?,
+            Type::Interface(name) => write!(out, "interface {}", Quoted(name))?,
             Type::Subrange { base, low, high } => write!(out, "subrange {} {low}..{high}", elem_name(*base))?,
             Type::Error => write!(out, "error")?,
         }

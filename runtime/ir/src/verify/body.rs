@@ -14,7 +14,10 @@ pub(super) fn check(program: &Program, id: BodyId) -> Result<(), VerifyError> {
         let place = |inst, defect| VerifyError { body: Some(id), block: Some(BlockId(number as u32)), inst: Some(inst), defect };
         for (i, inst) in block.insts.iter().enumerate() {
             checker.inst(inst).map_err(|defect| place(i, defect))?;
+            let begins = i == 0 && body.blocks.iter().any(|b| b.handler == Some(BlockId(number as u32)));
+            ensure(begins || !matches!(inst, Inst::Catch { .. }), Defect::Handler).map_err(|defect| place(i, defect))?;
         }
+        checker.handler(block).map_err(|defect| place(block.insts.len(), defect))?;
         checker.term(block).map_err(|defect| place(block.insts.len(), defect))?;
     }
     flow::check(body).map_err(in_body)
@@ -76,7 +79,20 @@ impl Checker<'_> {
                 ensure(end <= self.program.data.len() as u64, Defect::Data { from: *data, len: *len })?;
                 self.access(*dst, *offset, *len)
             }
-            Inst::Call { .. } | Inst::Native { .. } => self.call(inst),
+            Inst::Call { .. } | Inst::Native { .. } | Inst::Virtual { .. } => self.call(inst),
+            Inst::IsA { dst, pointer, family } => {
+                ensure((*family as usize) < self.program.families.len(), Defect::Family(*family))?;
+                self.needs(*dst, Ty::I64)?;
+                self.needs(*pointer, Ty::I64)
+            }
+            Inst::Place { offset, class, count } => {
+                let size = self.program.class(*class).ok_or(Defect::Class(*class))?.size;
+                let bytes = u32::try_from(u64::from(size) * u64::from(*count)).map_err(|_| Defect::Class(*class))?;
+                ensure(offset.is_multiple_of(takt_abi::GRANULE as u32), Defect::Class(*class))?;
+                self.access(Base::Frame, *offset, bytes)
+            }
+            Inst::Guard { dst } => self.needs(*dst, Ty::I64),
+            Inst::Catch { dst, depth } => self.needs(*dst, Ty::I64).and_then(|()| self.needs(*depth, Ty::I64)),
             Inst::Poll { site, .. } => self.site(*site),
         }
     }
@@ -103,6 +119,16 @@ impl Checker<'_> {
                 }
                 self.site(*site)
             }
+            Inst::Virtual { method, this, args, dst, site } => {
+                let callee = self.program.dispatch.get(*method as usize).ok_or(Defect::Method(*method))?;
+                self.needs(*this, Ty::I64)?;
+                ensure(args.len() == callee.params.len(), Defect::Arity { expected: callee.params.len(), found: args.len() })?;
+                args.iter().zip(&callee.params).try_for_each(|(arg, param)| fits(*param, self.ty(*arg)?))?;
+                if let Some(dst) = dst {
+                    self.needs(*dst, callee.result.ok_or(Defect::Result)?)?;
+                }
+                self.site(*site)
+            }
             Inst::Native { native, args, dst, site } => {
                 ensure((native.0 as usize) < self.program.natives.len(), Defect::Native(native.0))?;
                 ensure(args.len() < NATIVE_WORDS, Defect::Arity { expected: NATIVE_WORDS - 1, found: args.len() })?;
@@ -114,6 +140,13 @@ impl Checker<'_> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// A handler takes the fault that led to it.
+    fn handler(&self, block: &Block) -> Result<(), Defect> {
+        let Some(handler) = block.handler else { return Ok(()) };
+        self.block(handler)?;
+        ensure(matches!(self.body.blocks[handler.0 as usize].insts.first(), Some(Inst::Catch { .. })), Defect::Handler)
     }
 
     fn term(&self, block: &Block) -> Result<(), Defect> {

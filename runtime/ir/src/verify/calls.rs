@@ -1,11 +1,11 @@
 //! Calls: every body on a cycle counts its depth, so that no program can nest calls without limit, and a bound of the native stack can be told.
 
 use super::{Defect, VerifyError};
-use crate::inst::{Body, BodyId, Inst};
+use crate::inst::{Body, BodyId};
 use crate::program::Program;
 
 pub(super) fn check(program: &Program) -> Result<(), VerifyError> {
-    let calls: Vec<Vec<usize>> = program.bodies.iter().map(callees).collect();
+    let calls: Vec<Vec<usize>> = program.bodies.iter().map(|body| callees(program, body)).collect();
     let ends = ends(&calls);
     let unmarked = (0..calls.len()).filter(|body| !ends[*body] && !program.bodies[*body].recursive);
     for body in unmarked {
@@ -16,10 +16,8 @@ pub(super) fn check(program: &Program) -> Result<(), VerifyError> {
     Ok(())
 }
 
-fn callees(body: &Body) -> Vec<usize> {
-    let insts = body.blocks.iter().flat_map(|block| &block.insts);
-    let mut callees: Vec<usize> =
-        insts.filter_map(|i| if let Inst::Call { body, .. } = i { Some(body.0 as usize) } else { None }).collect();
+fn callees(program: &Program, body: &Body) -> Vec<usize> {
+    let mut callees = program.callees(body);
     callees.sort_unstable();
     callees.dedup();
     callees

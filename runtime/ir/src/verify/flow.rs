@@ -42,11 +42,14 @@ fn starts(body: &Body, none: &Known<'_>) -> Vec<Vec<u64>> {
     let mut waiting = vec![0];
     while let Some(id) = waiting.pop() {
         let mut known = Known { slots: none.slots, set: starts[id].clone() };
+        // A fault may strike before the first address is written.
+        let handler = body.blocks[id].handler.map(|handler| (handler, known.set.clone()));
         body.blocks[id].insts.iter().for_each(|inst| known.write(inst));
-        for BlockId(next) in successors(&body.blocks[id]) {
+        let next = successors(&body.blocks[id]).into_iter().map(|next| (next, known.set.clone()));
+        for (BlockId(next), known) in next.chain(handler) {
             let next = next as usize;
             let mut changed = !std::mem::replace(&mut reached[next], true);
-            for (at_start, at_end) in starts[next].iter_mut().zip(&known.set) {
+            for (at_start, at_end) in starts[next].iter_mut().zip(&known) {
                 changed |= *at_start & !at_end != 0;
                 *at_start &= at_end;
             }
@@ -99,8 +102,18 @@ impl Known<'_> {
             | Inst::Pointer { base, .. }
             | Inst::Data { dst: base, .. } => self.need_base(*base),
             Inst::Move { dst, src, .. } => self.need_base(*dst).and_then(|()| self.need_base(*src)),
-            Inst::Call { args, .. } | Inst::Native { args, .. } => args.iter().try_for_each(|arg| self.need(*arg)),
-            Inst::Const { .. } | Inst::Op { .. } | Inst::Check { .. } | Inst::Deref { .. } | Inst::Poll { .. } => Ok(()),
+            Inst::Call { args, .. } | Inst::Native { args, .. } | Inst::Virtual { args, .. } => {
+                args.iter().try_for_each(|arg| self.need(*arg))
+            }
+            Inst::Const { .. }
+            | Inst::Op { .. }
+            | Inst::Check { .. }
+            | Inst::Deref { .. }
+            | Inst::IsA { .. }
+            | Inst::Place { .. }
+            | Inst::Guard { .. }
+            | Inst::Catch { .. }
+            | Inst::Poll { .. } => Ok(()),
         }
     }
     fn write(&mut self, inst: &Inst) {

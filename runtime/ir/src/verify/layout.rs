@@ -60,7 +60,7 @@ impl Sizes<'_> {
             }
             Type::String(n) => u64::from(*n) + 1,
             Type::WString(n) => 2 * u64::from(*n) + 2,
-            Type::Elem(_) | Type::Enum(_) | Type::Subrange { .. } | Type::Error => types.size(id).into(),
+            Type::Elem(_) | Type::Enum(_) | Type::Subrange { .. } | Type::Interface(_) | Type::Error => types.size(id).into(),
         };
         ensure(size <= u32::MAX.into(), Defect::Type(id.0))?;
         self.known[index] = Some(size);

@@ -17,10 +17,10 @@ use takt_ir::{BlockId, BodyId, Local, NativeId, SiteId, Term, Ty};
 const TABLE: usize = 64;
 
 const FUEL: i32 = offset_of!(Context, fuel) as i32;
-const DEPTH: i32 = offset_of!(Context, depth) as i32;
+pub(super) const DEPTH: i32 = offset_of!(Context, depth) as i32;
 const DEPTH_LIMIT: i32 = offset_of!(Context, depth_limit) as i32;
 const STACK_END: i32 = offset_of!(Context, stack_end) as i32;
-const FAULT_CODE: i32 = offset_of!(Context, fault_code) as i32;
+pub(super) const FAULT_CODE: i32 = offset_of!(Context, fault_code) as i32;
 // The atomic load of the flag takes no offset.
 const _: () = assert!(offset_of!(Context, flag) == 0);
 
@@ -36,7 +36,8 @@ pub(super) fn targets(term: &Term) -> Vec<BlockId> {
 
 impl Lowering<'_, '_> {
     /// Turns to a block.
-    pub(super) fn open(&mut self, block: usize) {
+    pub(super) fn open(&mut self, block: usize, handler: Option<BlockId>) {
+        self.handler = handler;
         self.b.switch_to_block(self.blocks[block]);
     }
     /// One more branch to a block is done; after the last one it is sealed, so that constants are seen across blocks.
@@ -68,7 +69,7 @@ impl Lowering<'_, '_> {
                 let (site, code) = (self.b.ins().iconst(types::I32, site), self.b.ins().iconst(types::I32, code));
                 let args = [self.ctx, site, code, facts[0], facts[1], facts[2]];
                 let code = self.call_host(runtime::stated as *const u8 as usize, &args, Some(types::I32));
-                self.leave(code);
+                self.fail(code, self.handler);
             }
         }
         for target in targets(term) {
@@ -193,8 +194,7 @@ impl Lowering<'_, '_> {
 
     pub(super) fn call(&mut self, body: BodyId, args: &[Local], dst: Option<Local>, site: SiteId) {
         let callee = self.callee(body);
-        let behind = if self.is(Defect::FrameShared) { 0 } else { i64::from(self.body.frame_size) };
-        let frame = if behind == 0 { self.frame } else { self.b.ins().iadd_imm_s(self.frame, behind) };
+        let frame = self.next_frame();
         let mut values = vec![self.ctx, self.image, frame];
         values.extend(args.iter().map(|arg| self.b.use_var(self.locals[arg.0 as usize])));
         if let (Defect::ArgumentsSwapped, [a, b, ..]) = (self.defect, args)
@@ -203,6 +203,15 @@ impl Lowering<'_, '_> {
             values.swap(3, 4);
         }
         let call = self.b.ins().call(callee, &values);
+        self.returned(call, dst, site);
+    }
+    /// Where the frame of a callee starts.
+    pub(super) fn next_frame(&mut self) -> Value {
+        let behind = if self.is(Defect::FrameShared) { 0 } else { i64::from(self.body.frame_size) };
+        if behind == 0 { self.frame } else { self.b.ins().iadd_imm_s(self.frame, behind) }
+    }
+    /// Back from a call: the fault goes on outwards, the result into its local.
+    pub(super) fn returned(&mut self, call: ir::Inst, dst: Option<Local>, site: SiteId) {
         let results = self.b.inst_results(call).to_vec();
         self.fault_if(results[0], Cold::Caller, site, &results[..1]);
         if let (Some(dst), Some(value)) = (dst, results.get(1))

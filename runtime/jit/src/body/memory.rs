@@ -196,7 +196,7 @@ impl Lowering<'_, '_> {
         let len = if self.is(Defect::DataShort) { len.saturating_sub(1) } else { len };
         if len > SMALL {
             let dst = self.address(dst.0, dst.1);
-            let src = self.int(self.pool.wrapping_add(data as usize) as i64);
+            let src = self.int(self.tables.pool.wrapping_add(data as usize) as i64);
             return self.move_long(dst, src, len);
         }
         let (start, offset) = self.place(dst.0, dst.1);

@@ -1,6 +1,6 @@
 //! Runs a program in both executors and compares all that can be seen.
 
-use takt_abi::{Context, Env, Fault, NoHost, Resources, TRACE_DEPTH, Time};
+use takt_abi::{Context, Env, Fault, NoHost, Time};
 use takt_ir::{
     Base, Block, Body, BodyId, Const, Inst, Interpreter, Local, Mem, NULL_ZONE, Native, Program, Site, SiteId, Task, Term, Trigger, Ty,
 };
@@ -66,32 +66,11 @@ unsafe extern "C" fn poll(ctx: *mut Context, site: u32) -> u32 {
 fn run(program: &Program, start: Start, executor: impl FnOnce(&mut Context) -> (u32, u64)) -> Outcome {
     let mut image = vec![0; program.image_size as usize];
     image[..program.init.len()].copy_from_slice(&program.init);
-    let mut env = Env {
-        now: Time(0),
-        period: Time(1_000_000),
-        task: 0,
-        cycle: start.slices,
-        bus_task: 0,
-        bus_period: Time(1_000_000),
-        resources: Resources::default(),
-        host: Box::new(NoHost),
-    };
-    let mut ctx = Context {
-        flag: start.flag.into(),
-        fault_code: 0,
-        fuel: start.fuel,
-        fault_site: 0,
-        trace_len: 0,
-        fault_facts: [0; 3],
-        depth: 0,
-        depth_limit: start.depth_limit,
-        image: image.as_mut_ptr(),
-        image_size: program.image_size.into(),
-        stack_end: u64::from(program.tasks[0].stack.0 + program.tasks[0].stack.1),
-        poll,
-        trace: [0; TRACE_DEPTH],
-        env: &mut env,
-    };
+    let mut env = Env::new(Time(1_000_000), Box::new(NoHost));
+    (env.cycle, env.classes, env.heap) = (start.slices, program.instances(), program.heap());
+    let mut ctx = Context::new(image.as_mut_ptr(), program.image_size.into(), &mut env, poll);
+    (ctx.flag, ctx.fuel, ctx.depth_limit, ctx.fault_site) = (start.flag.into(), start.fuel, start.depth_limit, 0);
+    ctx.stack_end = u64::from(program.tasks[0].stack.0 + program.tasks[0].stack.1);
     let (code, result) = executor(&mut ctx);
     // A result is a word in a register: which NaN it is says nothing.
     let result = match program.bodies[program.tasks[0].entry.0 as usize].result {
@@ -164,12 +143,14 @@ pub struct Writer {
     pub body: Body,
     pub sites: u32,
     current: usize,
+    /// Handler of the blocks that are made from now on.
+    pub handler: Option<takt_ir::BlockId>,
 }
 
 impl Writer {
     /// A body with these parameters.
     pub fn new(params: &[Ty], result: Option<Ty>, sites: u32) -> Self {
-        let blocks = vec![Block { insts: Vec::new(), term: Term::Return(None) }];
+        let blocks = vec![Block { insts: Vec::new(), term: Term::Return(None), handler: None }];
         let params_len = params.len() as u32;
         let entry_site = SiteId(sites);
         let body = Body {
@@ -182,7 +163,7 @@ impl Writer {
             recursive: false,
             entry_site,
         };
-        Self { body, sites: sites + 1, current: 0 }
+        Self { body, sites: sites + 1, current: 0, handler: None }
     }
     pub fn local(&mut self, ty: Ty) -> Local {
         self.body.locals.push(ty);
@@ -197,7 +178,7 @@ impl Writer {
     }
     /// A new block, not yet current.
     pub fn block(&mut self) -> takt_ir::BlockId {
-        self.body.blocks.push(Block { insts: Vec::new(), term: Term::Return(None) });
+        self.body.blocks.push(Block { insts: Vec::new(), term: Term::Return(None), handler: self.handler });
         takt_ir::BlockId(self.body.blocks.len() as u32 - 1)
     }
     /// Ends the current block.

@@ -3,7 +3,9 @@
 
 use crate::bench::{IMAGE, Writer, program};
 use takt_abi::Fault;
-use takt_ir::{Base, BlockId, BodyId, Inst, Local, Mem, NULL_ZONE, Native, NativeId, Op, Program, Term, Ty, ops};
+use takt_ir::{
+    Base, BlockId, BodyId, Class, Dispatch, Family, Inst, Instances, Local, Mem, NULL_ZONE, Native, NativeId, Op, Program, Term, Ty, ops,
+};
 
 /// A small generator of random numbers (splitmix64).
 pub struct Random(u64);
@@ -93,7 +95,33 @@ pub fn random_program(seed: u64) -> Program {
         sites = generator.w.sites;
         bodies.push(generator.w.body);
     }
-    program(bodies, natives().into_iter().map(|(native, ..)| native).collect(), sites)
+    with_classes(program(bodies, natives().into_iter().map(|(native, ..)| native).collect(), sites), &shapes)
+}
+
+/// Offsets of instances, of class 1, 2 and 3.
+const INSTANCES: [u32; 4] = [128, 144, 256, 512];
+
+/// A body is a method if its first parameter is an address; class 2 has none of those of an odd number, class 1 none of those that take more than it has.
+fn is_method(shape: &Shape) -> bool {
+    matches!(shape.params.first(), Some(Ty::Addr(_)))
+}
+
+fn with_classes(program: Program, shapes: &[Shape]) -> Program {
+    let class = |size: u32| Class { name: format!("Class{size}"), size };
+    let methods = shapes.iter().enumerate().filter(|(_, shape)| is_method(shape)).map(|(i, shape)| {
+        let small = shape.params[0] == Ty::Addr(8);
+        let body = Some(BodyId(i as u32));
+        let targets = vec![body.filter(|_| small), body.filter(|_| i % 2 == 0), body];
+        Dispatch { name: format!("M{i}"), params: shape.params[1..].to_vec(), result: shape.result, low: 1, targets }
+    });
+    let run = |offset, class, count| Instances { offset, class, count };
+    Program {
+        dispatch: methods.collect(),
+        classes: vec![class(16), class(48), class(64)],
+        instances: vec![run(INSTANCES[0], 1, 2), run(INSTANCES[2], 2, 1), run(INSTANCES[3], 3, 1)],
+        families: vec![Family { name: "F".into(), low: 1, members: vec![true, false, true] }],
+        ..program
+    }
 }
 
 fn shape(random: &mut Random, i: usize, cycle: bool) -> Shape {
@@ -222,6 +250,8 @@ impl<'a> Generator<'a> {
                 5 => self.address(),
                 6 => self.copy_bytes(),
                 7 => self.memory(),
+                9 if depth < 3 && self.random.one_in(3) => self.protect(depth),
+                10 if self.random.one_in(4) => self.instances(),
                 8 if depth > 0 && self.random.one_in(8) => {
                     self.stop();
                     let next = self.w.block();
@@ -467,6 +497,56 @@ impl<'a> Generator<'a> {
         self.w.open(next);
     }
 
+    /// Statements whose faults are caught.
+    fn protect(&mut self, depth: usize) {
+        let kept = self.w.local(Ty::I64);
+        self.w.push(Inst::Guard { dst: kept });
+        let [handler, next] = [self.w.block(), self.w.block()];
+        let outer = self.w.handler.replace(handler);
+        let inside = self.w.block();
+        self.w.end(Term::Jump(inside));
+        self.w.open(inside);
+        self.statements(depth + 1);
+        self.w.end(Term::Jump(next));
+        self.w.handler = outer;
+        self.w.open(handler);
+        let code = self.target(Ty::I64);
+        self.w.push(Inst::Catch { dst: code, depth: kept });
+        self.observe(code);
+        self.statements(depth + 1);
+        self.w.end(Term::Jump(next));
+        self.w.open(next);
+    }
+    /// The offset of an instance most times.
+    fn instance(&mut self) -> Local {
+        match self.random.below(8) {
+            0 => self.value(Ty::I64),
+            1 => {
+                let wrong = self.random.pick(&[0, 1, 129, 136, 160, 272, i64::from(IMAGE), i64::from(IMAGE) - 16, -16]);
+                self.w.int(wrong)
+            }
+            2 if self.w.body.frame_size > 0 => {
+                let dst = self.w.local(Ty::I64);
+                self.w.push(Inst::Pointer { dst, base: Base::Frame, offset: 0 });
+                dst
+            }
+            _ => {
+                let offset = self.random.pick(&INSTANCES);
+                self.w.int(offset.into())
+            }
+        }
+    }
+    /// Instances in the frame, and questions about instances.
+    fn instances(&mut self) {
+        if self.w.body.frame_size >= 64 && self.random.one_in(2) {
+            let (class, count) = self.random.pick(&[(1, 2), (2, 1), (3, 1)]);
+            return self.w.push(Inst::Place { offset: 0, class, count });
+        }
+        let (pointer, dst) = (self.instance(), self.target(Ty::I64));
+        self.w.push(Inst::IsA { dst, pointer, family: 0 });
+        self.observe(dst);
+    }
+
     fn argument(&mut self, ty: Ty) -> Local {
         let Ty::Addr(extent) = ty else { return self.value(ty) };
         let dst = self.w.local(Ty::Addr(extent + self.random.pick(&[0u32, 0, 8])));
@@ -484,6 +564,14 @@ impl<'a> Generator<'a> {
         }
         let i = self.random.pick(&callable);
         let shape = self.shapes[i].clone();
+        if is_method(&shape) && self.random.one_in(2) {
+            let method = self.shapes[..i].iter().filter(|shape| is_method(shape)).count() as u32;
+            let this = self.instance();
+            let args: Vec<Local> = shape.params[1..].iter().map(|ty| self.argument(*ty)).collect();
+            let dst = shape.result.map(|ty| self.target(ty));
+            let site = self.w.site();
+            return self.w.push(Inst::Virtual { method, this, args, dst, site });
+        }
         let args: Vec<Local> = shape.params.iter().map(|ty| self.argument(*ty)).collect();
         let dst = shape.result.filter(|_| !self.random.one_in(5)).map(|ty| self.target(ty));
         let site = self.w.site();

@@ -2,7 +2,7 @@
 
 use super::Parser;
 use crate::lexer::Kind;
-use crate::tree::{Action, Method, Pou, Property, Stmt, VarBlock};
+use crate::tree::{Action, Method, Name, Pou, Property, Stmt, TypeExpr, VarBlock, VarDecl, VarKind};
 
 impl Parser<'_> {
     /// Reads one member into its unit.
@@ -62,6 +62,9 @@ impl Parser<'_> {
         }
         self.failed = false;
         self.end_of_block();
+        if let Some((vars, _)) = &mut set {
+            vars.insert(0, new_value(&name, &ty));
+        }
         Property { name, modifiers, ty, get, set, span: self.span_from(start.start) }
     }
 
@@ -89,4 +92,12 @@ impl Parser<'_> {
         self.end_of_block();
         Action { name, body, span: self.span_from(start.start) }
     }
+}
+
+/// What SET is given: an input with the name of the property.
+fn new_value(name: &Name, ty: &TypeExpr) -> VarBlock {
+    let (name, ty) = (name.clone(), ty.clone());
+    let span = name.span;
+    let value = VarDecl { name, at: None, ty, init: None, fb_init: Vec::new(), pragmas: Vec::new(), doc: None };
+    VarBlock { kind: VarKind::Input, constant: false, retain: false, persistent: false, vars: vec![value], span }
 }

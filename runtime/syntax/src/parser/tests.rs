@@ -375,7 +375,7 @@ fn members_stand_inside_and_behind_their_block() {
     assert_eq!(pou.methods[0].modifiers.access, tree::Access::Private);
     assert_eq!(pou.actions.iter().map(|a| a.name.text.as_str()).collect::<Vec<_>>(), ["stop", "more"]);
     assert!(pou.properties[0].get.as_ref().is_some_and(|get| get.1.len() == 1));
-    assert!(pou.properties[0].set.as_ref().is_some_and(|set| set.0.len() == 1 && set.1.len() == 1));
+    assert!(pou.properties[0].set.as_ref().is_some_and(|set| set.0.len() == 2 && set.1.len() == 1));
     assert_eq!(brief_body(&pou.body), "speed Assign (speed Add 1);");
     assert_eq!(&text[pou.end.start as usize..pou.end.end as usize], "END_FUNCTION_BLOCK");
     assert_eq!(pou.span.end, pou.end.end);

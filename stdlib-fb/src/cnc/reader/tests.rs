@@ -5,7 +5,7 @@ use crate::cnc::interpreter::NcInterpreter;
 use crate::cnc::queue::{DeleteObj, GetCount, GetObj};
 use crate::cnc::types::{GeoInfo, MoveType, PosInfo};
 use std::collections::BTreeMap;
-use takt_abi::{CHUNK, Chunk, Host, HostError, InOut, Plain, Request, Resources, Ticket, Time};
+use takt_abi::{CHUNK, Chunk, Host, HostError, InOut, Plain, Request, Ticket, Time};
 
 /// Where the content of a file comes from.
 pub(crate) enum Content {
@@ -80,8 +80,7 @@ impl Host for Files {
 
 /// An environment for one block or two.
 pub(crate) fn env(host: impl Host + 'static) -> Env {
-    let (period, resources) = (Time::from_millis(10), Resources::default());
-    Env { now: Time(0), period, task: 1, cycle: 0, bus_task: 0, bus_period: Time::from_millis(1), resources, host: Box::new(host) }
+    Env { task: 1, bus_period: Time::from_millis(1), ..Env::new(Time::from_millis(10), Box::new(host)) }
 }
 
 const READER: u64 = 64;

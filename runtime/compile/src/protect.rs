@@ -1,0 +1,76 @@
+//! `__TRY … __CATCH(code) … __FINALLY … __ENDTRY`.
+
+use crate::expression::{Kind, Lowering, Thing};
+use takt_ir::{Inst, Local, Op, Term, Ty};
+use takt_syntax::tree::{Name, Stmt};
+use takt_syntax::{Code, Span};
+
+/// Numbers of faults ([`takt_abi::Fault::code`]) and what `__SYSTEM.ExceptionCode` calls them.
+const EXCEPTIONS: [(i64, i64); 7] = [(1, 0x101), (2, 0x102), (3, 0x51), (4, 0x51), (7, 0x2000), (9, 0x56), (11, 0x51)];
+
+impl<'a> Lowering<'_, 'a> {
+    pub(crate) fn try_statement(
+        &mut self,
+        body: &'a [Stmt],
+        catch: Option<&'a (Option<Name>, Vec<Stmt>)>,
+        finally: Option<&'a [Stmt]>,
+        span: Span,
+    ) {
+        let Some((variable, handling)) = catch else {
+            self.report(Code::BadStatement, span, "a __TRY needs a __CATCH").help = Some("write `__CATCH(code)` before `__ENDTRY`".into());
+            return self.statements(body);
+        };
+        let depth = self.b.local(Ty::I64);
+        self.b.push(Inst::Guard { dst: depth });
+        let (handler, after) = (self.b.block(), self.b.block());
+        let outer = self.b.guard(Some(handler));
+        let inside = self.b.block();
+        self.b.continue_in(inside);
+        self.protected.push((self.loops.len(), finally.unwrap_or_default()));
+        self.statements(body);
+        self.b.guard(outer);
+        self.b.end(Term::Jump(after));
+        self.b.go_to(handler);
+        let fault = self.b.local(Ty::I64);
+        self.b.push(Inst::Catch { dst: fault, depth });
+        if let Some(variable) = variable {
+            self.tell_exception(variable, fault);
+        }
+        self.statements(handling);
+        self.protected.pop();
+        self.b.continue_in(after);
+        self.statements(finally.unwrap_or_default());
+    }
+
+    /// Puts the code of the exception into the variable of __CATCH.
+    fn tell_exception(&mut self, variable: &'a Name, fault: Local) {
+        let span = variable.span;
+        let Thing::Value(target) = self.name(&variable.text, span) else { return };
+        let usable = self.scalar(target.ty).is_some_and(crate::types::is_integer);
+        let (Kind::Place(place), None, true) = (&target.kind, target.fixed, usable) else {
+            if !target.is_error() {
+                let found = self.operand_name(&target);
+                self.report(Code::TypeMismatch, span, format!("expected a variable of type `__SYSTEM.ExceptionCode`, found {found}"));
+            }
+            return;
+        };
+        let site = self.site(span);
+        let mut code = self.b.int(0xFFFF_FFFF);
+        for (number, exception) in EXCEPTIONS {
+            let (number, exception) = (self.b.int(number), self.b.int(exception));
+            let hit = self.b.op(Op::Eq, &[fault, number], site);
+            code = self.b.op(Op::Select, &[hit, exception, code], site);
+        }
+        self.store(&place.clone(), target.ty, code, false, span);
+    }
+
+    /// What __FINALLY says where control leaves the protected statements that were entered with more than `loops` loops around them.
+    pub(crate) fn leave_protected(&mut self, loops: usize) {
+        let left = self.protected.iter().rposition(|(depth, _)| *depth < loops).map_or(0, |i| i + 1);
+        let rest = self.protected.split_off(left);
+        for (_, finally) in rest.iter().rev() {
+            self.statements(finally);
+        }
+        self.protected.extend(rest);
+    }
+}
