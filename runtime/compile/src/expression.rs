@@ -187,6 +187,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 self.unary(*op, a, e.span)
             }
             ExprKind::Binary(op, a, b) => self.binary_expr(*op, a, b, e.span),
+            ExprKind::Chain(first, links) => self.chain(first, links),
             ExprKind::Call(callee, args) => self.call(callee, args, e.span),
             ExprKind::Assign(target, value) => {
                 let target = self.expr(target);

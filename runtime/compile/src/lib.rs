@@ -28,6 +28,7 @@ mod string;
 mod task;
 mod types;
 mod unit;
+mod unsupported;
 
 use takt_syntax::{Diagnostic, FileId, Source};
 
@@ -84,8 +85,9 @@ pub fn compile(input: Input<'_>) -> Output {
             continue;
         }
         let (tree, found) = takt_syntax::parse(id, &file.text);
-        trees.push(tree);
         diagnostics.extend(found);
+        diagnostics.extend(unsupported::find(&tree));
+        trees.push(tree);
     }
     let mut unit = unit::Compiler::new(&input, &files, &trees, diagnostics);
     let (program, conditions) = unit.run();

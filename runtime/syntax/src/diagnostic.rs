@@ -107,6 +107,7 @@ codes! {
     E0401 NoProgram "nothing to run: no program or task",
     E0402 BadTask "a task or configuration is not usable",
     E0403 TooLarge "the program needs more memory than an application may have",
+    W0101 NoEffect "a declaration that has no effect",
     W0301 LossyConversion "an implicit conversion may lose information",
     W0302 ResultUnused "a value is computed and not used",
     W0303 SharedData "two tasks use a variable and one may see it half changed",

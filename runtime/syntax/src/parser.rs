@@ -11,8 +11,10 @@ mod configuration;
 mod declarations;
 mod documentation;
 mod expressions;
+mod foreign;
 mod literals;
 mod members;
+mod namespaces;
 mod recovery;
 mod slips;
 mod statements;
@@ -22,13 +24,15 @@ mod units;
 use std::cell::OnceCell;
 
 use crate::lexer::{self, Kind, Lexed, MAX_DIAGNOSTICS, Token};
-use crate::tree::{self, Direct, Name, VarBlock};
+use crate::tree::{self, Direct, Home, Name, VarBlock};
 use crate::{Code, Diagnostic, FileId, LineIndex, Span};
 
 /// Deepest nesting of brackets and statements.
 const MAX_DEPTH: u32 = 200;
-/// Greatest height of an expression's tree (a long sum is a high tree).
+/// Greatest height of an expression's tree.
 const MAX_HEIGHT: u32 = 200;
+/// Height from which on a row of operators is kept as a chain instead of a tree.
+const CHAIN_HEIGHT: u32 = 64;
 
 /// Parses a source file. Never fails: what could not be read is missing or an `Error` node, and has a diagnostic. No expression is higher than 200
 /// nodes, and brackets and statements nest at most 200 deep. At most 1000 diagnostics of the lexer and as many of the parser are kept, in the order
@@ -89,6 +93,12 @@ struct Parser<'a> {
     is_homeless: bool,
     /// VAR sections found among the statements of the present unit.
     late_vars: Vec<VarBlock>,
+    /// Where the present unit stands.
+    home: Home,
+    /// What [`Self::home`] was outside of each open NAMESPACE.
+    outer_homes: Vec<Home>,
+    /// Inside of `<…>`, where `>` closes and does not compare.
+    is_in_angles: bool,
     diagnostics: Vec<Diagnostic>,
     /// Made when a message first names a line.
     lines: OnceCell<LineIndex>,
@@ -111,6 +121,9 @@ impl<'a> Parser<'a> {
             end_var_ahead: (0, false),
             is_homeless: false,
             late_vars: Vec::new(),
+            home: Home::default(),
+            outer_homes: Vec::new(),
+            is_in_angles: false,
             diagnostics: Vec::new(),
             lines: OnceCell::new(),
         })
@@ -433,7 +446,10 @@ fn is_unit_end(kind: Kind) -> bool {
 /// Whether a keyword opens a VAR section.
 fn is_var(kind: Kind) -> bool {
     use Kind::*;
-    matches!(kind, Var | VarInput | VarOutput | VarInOut | VarTemp | VarStat | VarInst | VarGlobal | VarExternal | VarConfig | VarAccess)
+    matches!(
+        kind,
+        Var | VarInput | VarOutput | VarInOut | VarTemp | VarStat | VarInst | VarGlobal | VarExternal | VarConfig | VarAccess | VarGeneric
+    )
 }
 
 #[cfg(test)]
