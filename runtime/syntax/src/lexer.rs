@@ -12,7 +12,7 @@ mod trivia;
 use logos::Logos;
 
 pub(crate) use kind::Kind;
-pub(crate) use trivia::{Comment, PlacedPragma};
+pub(crate) use trivia::{Comment, PlacedPragma, unquote};
 
 use crate::{Code, Diagnostic, FileId, Span};
 use scan::{PrefixClass, full_width, prefix_class, run, scan_date, scan_duration, scan_number, word_end};
@@ -44,6 +44,8 @@ pub(crate) struct Lexed {
     pub pragmas: Vec<PlacedPragma>,
     /// What was found wrong.
     pub diagnostics: Vec<Diagnostic>,
+    /// There are pragmas that act before the parser.
+    pub has_directives: bool,
     /// A comment or pragma swallowed the rest of the file: what is missing at its end is no second mistake.
     pub truncated: bool,
 }

@@ -23,6 +23,7 @@ mod units;
 
 use std::cell::OnceCell;
 
+use crate::conditions::{self, Conditions};
 use crate::lexer::{self, Kind, Lexed, MAX_DIAGNOSTICS, Token};
 use crate::tree::{self, Direct, Home, Name, VarBlock};
 use crate::{Code, Diagnostic, FileId, LineIndex, Span};
@@ -37,10 +38,25 @@ const CHAIN_HEIGHT: u32 = 64;
 /// Parses a source file. Never fails: what could not be read is missing or an `Error` node, and has a diagnostic. No expression is higher than 200
 /// nodes, and brackets and statements nest at most 200 deep. At most 1000 diagnostics of the lexer and as many of the parser are kept, in the order
 /// of their places.
+///
+/// Conditional pragmas see the names that this file declares, and no defines but its own; see [`parse_under`].
 pub fn parse(file: FileId, text: &str) -> (tree::File, Vec<Diagnostic>) {
+    let mut conditions = Conditions::default();
+    if conditions::asks(text) {
+        conditions.scan(&crate::Source { name: String::new(), text: text.to_owned() });
+    }
+    parse_under(file, text, &conditions)
+}
+
+/// As [`parse`], for a file of a project, whose `conditions` are those of all its files.
+pub fn parse_under(file: FileId, text: &str, conditions: &Conditions) -> (tree::File, Vec<Diagnostic>) {
     let Some(mut parser) = Parser::open(file, text) else { return (tree::File::default(), vec![too_large(file)]) };
-    let tree = parser.file();
-    (tree, parser.finish())
+    let suppressed = conditions.apply(&mut parser.lexed, file, text);
+    let mut tree = parser.file();
+    tree.suppressed = suppressed;
+    let mut diagnostics = parser.finish();
+    diagnostics.retain(|diagnostic| !tree.suppresses(diagnostic));
+    (tree, diagnostics)
 }
 
 /// Parses one expression, which is the whole text.

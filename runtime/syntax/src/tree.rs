@@ -3,7 +3,7 @@
 //! Names keep the spelling of the source; comparing them is case-insensitive and left to the reader. Nodes that could not be read are `Error` nodes,
 //! of which nobody need complain again.
 
-use crate::Span;
+use crate::{Code, Diagnostic, Span};
 
 /// A name as written.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,27 @@ pub struct Pragma {
 pub struct File {
     /// Program units in order.
     pub units: Vec<Unit>,
+    /// `{warning disable W0301} … {warning restore W0301}`.
+    pub suppressed: Vec<Suppressed>,
+}
+
+impl File {
+    /// Whether the file says that this message about it is not wanted.
+    pub fn suppresses(&self, diagnostic: &Diagnostic) -> bool {
+        let place = diagnostic.span.start;
+        self.suppressed.iter().any(|part| part.code == diagnostic.code && part.start <= place && place < part.end)
+    }
+}
+
+/// A part of a file where a warning is not wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suppressed {
+    /// Which.
+    pub code: Code,
+    /// First byte.
+    pub start: u32,
+    /// Behind the last byte.
+    pub end: u32,
 }
 
 /// What may stand at the top of a file.

@@ -62,6 +62,8 @@ pub struct Manifest {
     pub arithmetic: Arithmetic,
     /// Lossy implicit conversions are errors.
     pub strict: bool,
+    /// What conditional pragmas find defined, with its values.
+    pub defines: Vec<(String, String)>,
     /// The task that owns the bus, if named.
     pub bus_task: Option<Located<String>>,
     /// Axes in the order of the manifest.
@@ -100,6 +102,7 @@ pub fn read(name: &str, text: &str) -> Result<Manifest, ManifestErrors> {
 
 fn sections(root: &mut Table<'_, '_>, manifest: &mut Manifest) {
     root.section("project", |table| project(table, manifest));
+    root.section("defines", |table| defines(table, &mut manifest.defines));
     root.section("bus", |table| {
         table.choice("kind", &[("sim", ())]);
         manifest.bus_task = table.string("task");
@@ -123,6 +126,16 @@ fn project(table: &mut Table<'_, '_>, manifest: &mut Manifest) {
     manifest.sources = table.strings("sources").unwrap_or_default();
     manifest.arithmetic = table.choice("arithmetic", &[("codesys", Arithmetic::Codesys), ("iec", Arithmetic::Iec)]).unwrap_or_default();
     manifest.strict = table.boolean("strict").unwrap_or(false);
+}
+
+fn defines(table: &mut Table<'_, '_>, defines: &mut Vec<(String, String)>) {
+    for name in table.free_keys() {
+        let is_name = name.value.chars().all(|c| c.is_alphanumeric() || c == '_') && !name.value.is_empty();
+        if !is_name {
+            table.error(name.span, format!("`{}` in [defines] must be a name", name.value), "write for example `SIMULATION = \"\"`");
+        }
+        defines.extend(table.free_string(&name.value).map(|value| (name.value, value.value)));
+    }
 }
 
 fn wires(table: &mut Table<'_, '_>, wires: &mut Vec<Wire>) {

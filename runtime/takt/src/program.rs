@@ -50,6 +50,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
     let options = takt_compile::Options {
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
+        defines: project.manifest.defines.clone(),
         conditions: conditions.iter().map(|condition| Source { name: name(condition), text: condition.text.clone() }).collect(),
     };
     let output = takt_compile::compile(takt_compile::Input { sources: &project.sources.list, libraries: LIBRARIES, options: &options });

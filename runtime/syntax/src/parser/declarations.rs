@@ -122,6 +122,7 @@ impl Parser<'_> {
         }
         let (ty, fb_init) = self.type_with_arguments();
         let fb_inits = self.arguments_of_elements(&ty);
+        self.refuse_edge();
         let init = self.initializer();
         self.end_declaration();
         let pragmas = self.pragmas(index);

@@ -52,6 +52,17 @@ impl Parser<'_> {
         (stands_alone && is_instruction).then_some("IL")
     }
 
+    /// `a : BOOL R_EDGE`: refused, and read as a plain BOOL.
+    pub(super) fn refuse_edge(&mut self) {
+        let word = self.token();
+        if word.kind == Kind::Ident && !self.failed && (self.is_word(word, "R_EDGE") || self.is_word(word, "F_EDGE")) {
+            let message = format!("`{}` is not supported", self.text_of(word));
+            let help = "call an R_TRIG or F_TRIG with the input";
+            self.tell(Diagnostic::new(Code::NotSupported, self.span_of(word), message).help(help));
+            self.bump();
+        }
+    }
+
     /// `STRUCT OVERLAP`: refused, and read as a plain structure.
     pub(super) fn refuse_overlap(&mut self) {
         let word = self.token();

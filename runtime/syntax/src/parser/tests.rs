@@ -1,5 +1,7 @@
 //! Facts about the parser as a whole: what is read, what is said of mistakes, and that nothing makes it fall over.
 
+mod conditions;
+mod dialect;
 mod robustness;
 
 use super::*;
