@@ -51,6 +51,9 @@ pub fn parse(file: FileId, text: &str) -> (tree::File, Vec<Diagnostic>) {
 /// As [`parse`], for a file of a project, whose `conditions` are those of all its files.
 pub fn parse_under(file: FileId, text: &str, conditions: &Conditions) -> (tree::File, Vec<Diagnostic>) {
     let Some(mut parser) = Parser::open(file, text) else { return (tree::File::default(), vec![too_large(file)]) };
+    if let Some(diagnostic) = parser.markup() {
+        return (tree::File::default(), vec![diagnostic]);
+    }
     let suppressed = conditions.apply(&mut parser.lexed, file, text);
     let mut tree = parser.file();
     tree.suppressed = suppressed;

@@ -54,15 +54,17 @@ impl Parser<'_> {
         loop {
             if self.kind() == Kind::Ident {
                 self.respell();
+                self.respell_end();
             }
             let (brackets, before) = (self.brackets, self.at);
             if self.eat(Kind::Semi) {
                 continue;
             }
-            if self.is_block_boundary() {
+            if self.kind().is_reserved() && matches!(self.peek(1).kind, Kind::Colon | Kind::At) && !is_end(self.kind()) {
+                self.keyword_as_name();
+            } else if self.is_block_boundary() {
                 return list;
-            }
-            if self.kind().is_name() {
+            } else if self.kind().is_name() {
                 let declares = matches!(self.peek(1).kind, Kind::Colon | Kind::Comma | Kind::At | Kind::Dot);
                 if !declares && !*is_closed.get_or_insert_with(|| self.is_closed_ahead()) {
                     return list;

@@ -342,11 +342,26 @@ impl Parser<'_> {
                 Tall::leaf(ExprKind::Error, span)
             }
             kind if kind.is_name() => self.typed_name(),
+            kind if kind.is_reserved() && !token.starts_line && self.is_lone_keyword() => {
+                let message = format!("expected an expression, found the keyword `{}`", self.text_of(token));
+                self.report(Code::UnexpectedToken, span, message);
+                self.bump();
+                Tall::leaf(ExprKind::Error, span)
+            }
             _ => {
                 self.missing_part("an expression");
                 Tall::leaf(ExprKind::Error, self.gap())
             }
         }
+    }
+
+    /// Whether a keyword stands where a value ends: it was meant as one.
+    fn is_lone_keyword(&self) -> bool {
+        let is_statement = matches!(self.kind(), Kind::Then | Kind::Do | Kind::Of | Kind::To | Kind::By);
+        let next = self.peek(1).kind;
+        !is_statement
+            && !super::is_end(self.kind())
+            && (matches!(next, Kind::Semi | Kind::RParen | Kind::Comma) || binary_op(next).is_some())
     }
 
     /// `E_COLOR#red`, or a name that is a word in other places.

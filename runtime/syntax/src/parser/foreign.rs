@@ -12,6 +12,15 @@ const EXPORTED: &[(&str, &str)] =
 const INSTRUCTIONS: &[&str] = &["LD", "LDN", "ST", "STN", "CAL", "CALC", "CALCN", "JMPC", "JMPCN", "ANDN", "ORN"];
 
 impl Parser<'_> {
+    /// A file that is XML: one message for all of it.
+    pub(super) fn markup(&self) -> Option<Diagnostic> {
+        let at = self.text.find(|c: char| !c.is_whitespace() && c != '\u{feff}')?;
+        let is_xml = self.text[at..].starts_with("<?xml") || self.text[at..].starts_with("<TcPlcObject");
+        let span = crate::Span { file: self.file, start: at as u32, end: at as u32 + 1 };
+        let diagnostic = Diagnostic::new(Code::NotSupported, span, "expected Structured Text, found XML");
+        is_xml.then(|| diagnostic.help("only the text of declarations and bodies is read, each in its unit"))
+    }
+
     /// Reports a body that is not written in ST, and skips it to the END_ of its unit.
     pub(super) fn foreign_body(&mut self) {
         let Some(language) = self.foreign_language() else { return };

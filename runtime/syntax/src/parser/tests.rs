@@ -2,6 +2,7 @@
 
 mod conditions;
 mod dialect;
+mod messages;
 mod robustness;
 
 use super::*;

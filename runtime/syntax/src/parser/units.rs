@@ -228,7 +228,14 @@ impl Parser<'_> {
         let is_sign =
             !next.kind.is_name() && !next.kind.is_reserved() && !matches!(next.kind, Kind::Eof | Kind::Dot | Kind::Direct | Kind::Bad);
         if !self.failed && !next.starts_line && (is_lone_name || is_sign) {
-            self.unexpected_here("the end of the line or `:` and a type");
+            let mut diagnostic = self.unexpected("the end of the line or `:` and a type");
+            if next.kind == Kind::LParen {
+                diagnostic.help = Some("parameters are declared in VAR_INPUT … END_VAR".to_owned());
+            }
+            if !self.is_known_trouble() {
+                self.tell(diagnostic);
+            }
+            self.failed = true;
         }
         if self.failed {
             while !self.token().starts_line && !self.starts_unit() && !is_var(self.kind()) && !is_end(self.kind()) {
