@@ -370,6 +370,10 @@ impl<'a> Lowering<'_, 'a> {
                 self.taken_expr(a, taken);
                 self.taken_expr(b, taken);
             }
+            ExprKind::Chain(first, links) => {
+                self.taken_expr(first, taken);
+                links.iter().for_each(|link| self.taken_expr(&link.right, taken));
+            }
             ExprKind::Call(callee, args) => {
                 self.taken_expr(callee, taken);
                 let by_reference = self.takes_addresses(callee);

@@ -250,6 +250,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 self.unary(*op, a, e.span)
             }
             ExprKind::Binary(op, a, b) => self.binary_expr(*op, a, b, e.span),
+            ExprKind::Chain(first, links) => self.chain(first, links),
             ExprKind::Call(callee, args) => {
                 let result = self.call(callee, args, e.span);
                 self.follow(result)

@@ -33,6 +33,7 @@ mod string;
 mod task;
 mod types;
 mod unit;
+mod unsupported;
 
 use takt_syntax::{Diagnostic, FileId, Source};
 
@@ -58,6 +59,8 @@ pub struct Options {
     pub heap: u32,
     /// BOOL expressions in global scope (`--until`, conditions of the manifest). Their [`FileId`]s follow those of the sources.
     pub conditions: Vec<Source>,
+    /// What `{IF defined(NAME)}` and `hasvalue(NAME, 'text')` ask for, with values that may be empty.
+    pub defines: Vec<(String, String)>,
 }
 
 /// What came of it.
@@ -83,22 +86,38 @@ pub fn compile(input: Input<'_>) -> Output {
     }
     let (user, conditions) = (input.sources.len(), input.options.conditions.len());
     let mut diagnostics = Vec::new();
-    let mut trees = Vec::new();
+    let mut trees: Vec<takt_syntax::tree::File> = Vec::new();
+    let pragmas = pragma_conditions(&input, &files);
     for (i, file) in files.iter().enumerate() {
         let id = FileId(i as u32);
         if (user..user + conditions).contains(&i) {
             trees.push(takt_syntax::tree::File::default());
             continue;
         }
-        let (tree, found) = takt_syntax::parse(id, &file.text);
-        trees.push(tree);
+        let (tree, found) = takt_syntax::parse_under(id, &file.text, &pragmas);
         diagnostics.extend(found);
+        diagnostics.extend(unsupported::find(&tree));
+        trees.push(tree);
     }
     let mut unit = unit::Compiler::new(&input, &files, &trees, diagnostics);
     let (program, conditions) = unit.run();
     let mut diagnostics = unit.finish();
+    diagnostics.retain(|d| !trees.get(d.span.file.0 as usize).is_some_and(|tree| tree.suppresses(d)));
     diagnostics.sort_by_key(|d| (d.span.file, d.span.start, d.span.end, d.code));
     diagnostics.dedup();
     let failed = diagnostics.iter().any(|d| d.severity() == takt_syntax::Severity::Error);
     Output { program: (!failed).then_some(program), diagnostics, conditions, files }
+}
+
+/// What the conditional pragmas of all files may ask for.
+fn pragma_conditions(input: &Input<'_>, files: &[Source]) -> takt_syntax::Conditions {
+    let mut conditions = takt_syntax::Conditions::of(files.iter(), &input.options.defines);
+    for library in input.libraries {
+        library.blocks.iter().for_each(|block| conditions.add_pou(block.name));
+        library.functions.iter().for_each(|function| conditions.add_pou(function.name));
+        library.structs.iter().for_each(|structure| conditions.add_type(structure.name));
+        library.enums.iter().for_each(|enumeration| conditions.add_type(enumeration.name));
+        library.aliases.iter().for_each(|(alias, _)| conditions.add_type(alias));
+    }
+    conditions
 }

@@ -5,7 +5,7 @@ use crate::expression::{Kind, Lowering, Operand};
 use crate::types::is_integer;
 use takt_abi::Elem;
 use takt_ir::{Inst, Local, Op, Term, Ty, Type, TypeId};
-use takt_syntax::tree::{BinaryOp, Expr, UnaryOp};
+use takt_syntax::tree::{BinaryOp, Expr, Link, UnaryOp};
 use takt_syntax::{Code, Span};
 
 /// What an operator sees in a type.
@@ -171,6 +171,16 @@ impl<'a> Lowering<'_, 'a> {
 
     pub(crate) fn binary_expr(&mut self, op: BinaryOp, a: &'a Expr, b: &'a Expr, span: Span) -> Operand {
         let left = self.expr(a);
+        self.applied(op, left, b, span)
+    }
+
+    /// A row of operators, from the left.
+    pub(crate) fn chain(&mut self, first: &'a Expr, links: &'a [Link]) -> Operand {
+        let first = self.expr(first);
+        links.iter().fold(first, |left, link| self.applied(link.op, left, &link.right, link.span))
+    }
+
+    fn applied(&mut self, op: BinaryOp, left: Operand, b: &'a Expr, span: Span) -> Operand {
         if matches!(op, BinaryOp::AndThen | BinaryOp::OrElse) {
             return self.short_circuit(op, left, b, span);
         }

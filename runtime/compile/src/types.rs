@@ -74,6 +74,10 @@ impl<'a> Compiler<'a> {
                 let id = self.types.push(Type::Error);
                 self.structure(id, "(structure)", fields, StructKind::Struct, None)
             }
+            TypeExprKind::Generic { .. } => {
+                self.report(Code::NotSupported, t.span, "a block with VAR_GENERIC constants is not supported yet");
+                self.error_type()
+            }
             TypeExprKind::Error => self.error_type(),
         }
     }

@@ -12,7 +12,7 @@ mod trivia;
 use logos::Logos;
 
 pub(crate) use kind::Kind;
-pub(crate) use trivia::{Comment, PlacedPragma};
+pub(crate) use trivia::{Comment, PlacedPragma, unquote};
 
 use crate::{Code, Diagnostic, FileId, Span};
 use scan::{PrefixClass, full_width, prefix_class, run, scan_date, scan_duration, scan_number, word_end};
@@ -44,6 +44,8 @@ pub(crate) struct Lexed {
     pub pragmas: Vec<PlacedPragma>,
     /// What was found wrong.
     pub diagnostics: Vec<Diagnostic>,
+    /// There are pragmas that act before the parser.
+    pub has_directives: bool,
     /// A comment or pragma swallowed the rest of the file: what is missing at its end is no second mistake.
     pub truncated: bool,
 }
@@ -117,6 +119,15 @@ enum Raw {
     #[token("-=", |_| Kind::Assign)]
     #[token("*=", |_| Kind::Assign)]
     #[token("/=", |_| Kind::Assign)]
+    #[token("<<=", |_| Kind::Assign)]
+    #[token(">>=", |_| Kind::Assign)]
+    #[token("%=", |_| Kind::Assign)]
+    #[token("|=", |_| Kind::Assign)]
+    #[token("<<", |_| Kind::Star)]
+    #[token(">>", |_| Kind::Slash)]
+    #[token("|", |_| Kind::Or)]
+    #[token("~", |_| Kind::Not)]
+    #[token("=:", |_| Kind::Assign)]
     #[token("=<", |_| Kind::Le)]
     #[token("->", |_| Kind::Dot)]
     Slip(Kind),
@@ -136,6 +147,13 @@ fn slip_help(sign: &str) -> &'static str {
         "-=" => "write `a := a - b;`",
         "*=" => "write `a := a * b;`",
         "/=" => "write `a := a / b;`, or `<>` for \"not equal\"",
+        "%=" => "write `a := a MOD b;`",
+        "|=" => "write `a := a OR b;`",
+        "<<" | "<<=" => "a shift to the left is written `SHL(a, n)`",
+        ">>" | ">>=" => "a shift to the right is written `SHR(a, n)`",
+        "|" => "\"or\" is written `OR`, of bits too",
+        "~" => "\"not\" is written `NOT`, of bits too",
+        "=:" => "an assignment is written `:=`",
         "=<" => "\"at most\" is written `<=`",
         _ => "a member is written `p^.member`",
     }
@@ -300,7 +318,7 @@ impl<'a> Scanner<'a> {
     /// Characters that start no token: one message for a run of them.
     fn unexpected(&mut self, start: usize) {
         let mut end = self.here();
-        while end < self.text.len() && (self.text.as_bytes()[end].is_ascii_control() || b"\\@$~?`|".contains(&self.text.as_bytes()[end])) {
+        while end < self.text.len() && (self.text.as_bytes()[end].is_ascii_control() || b"\\@$?`".contains(&self.text.as_bytes()[end])) {
             if self.text.as_bytes()[end].is_ascii_whitespace() {
                 break;
             }

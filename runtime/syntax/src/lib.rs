@@ -3,15 +3,17 @@
 //! Promises: never panics, always ends, reports every mistake once and goes on; every node carries its span. Lacks: any meaning. Names are not
 //! resolved here, types not known; that is `compile`.
 
+mod conditions;
 mod diagnostic;
 mod lexer;
 mod lines;
 mod parser;
 pub mod tree;
 
+pub use conditions::Conditions;
 pub use diagnostic::{Code, Diagnostic, Note, Severity, codes, explain};
 pub use lines::LineIndex;
-pub use parser::{parse, parse_expression};
+pub use parser::{parse, parse_expression, parse_under};
 
 /// Names a source file: index into the list that the caller keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

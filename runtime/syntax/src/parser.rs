@@ -11,8 +11,10 @@ mod configuration;
 mod declarations;
 mod documentation;
 mod expressions;
+mod foreign;
 mod literals;
 mod members;
+mod namespaces;
 mod recovery;
 mod slips;
 mod statements;
@@ -21,22 +23,43 @@ mod units;
 
 use std::cell::OnceCell;
 
+use crate::conditions::{self, Conditions};
 use crate::lexer::{self, Kind, Lexed, MAX_DIAGNOSTICS, Token};
-use crate::tree::{self, Direct, Name, VarBlock};
+use crate::tree::{self, Direct, Home, Name, VarBlock};
 use crate::{Code, Diagnostic, FileId, LineIndex, Span};
 
 /// Deepest nesting of brackets and statements.
 const MAX_DEPTH: u32 = 200;
-/// Greatest height of an expression's tree (a long sum is a high tree).
+/// Greatest height of an expression's tree.
 const MAX_HEIGHT: u32 = 200;
+/// Height from which on a row of operators is kept as a chain instead of a tree.
+const CHAIN_HEIGHT: u32 = 64;
 
 /// Parses a source file. Never fails: what could not be read is missing or an `Error` node, and has a diagnostic. No expression is higher than 200
 /// nodes, and brackets and statements nest at most 200 deep. At most 1000 diagnostics of the lexer and as many of the parser are kept, in the order
 /// of their places.
+///
+/// Conditional pragmas see the names that this file declares, and no defines but its own; see [`parse_under`].
 pub fn parse(file: FileId, text: &str) -> (tree::File, Vec<Diagnostic>) {
+    let mut conditions = Conditions::default();
+    if conditions::asks(text) {
+        conditions.scan(&crate::Source { name: String::new(), text: text.to_owned() });
+    }
+    parse_under(file, text, &conditions)
+}
+
+/// As [`parse`], for a file of a project, whose `conditions` are those of all its files.
+pub fn parse_under(file: FileId, text: &str, conditions: &Conditions) -> (tree::File, Vec<Diagnostic>) {
     let Some(mut parser) = Parser::open(file, text) else { return (tree::File::default(), vec![too_large(file)]) };
-    let tree = parser.file();
-    (tree, parser.finish())
+    if let Some(diagnostic) = parser.markup() {
+        return (tree::File::default(), vec![diagnostic]);
+    }
+    let suppressed = conditions.apply(&mut parser.lexed, file, text);
+    let mut tree = parser.file();
+    tree.suppressed = suppressed;
+    let mut diagnostics = parser.finish();
+    diagnostics.retain(|diagnostic| !tree.suppresses(diagnostic));
+    (tree, diagnostics)
 }
 
 /// Parses one expression, which is the whole text.
@@ -89,6 +112,12 @@ struct Parser<'a> {
     is_homeless: bool,
     /// VAR sections found among the statements of the present unit.
     late_vars: Vec<VarBlock>,
+    /// Where the present unit stands.
+    home: Home,
+    /// What [`Self::home`] was outside of each open NAMESPACE.
+    outer_homes: Vec<Home>,
+    /// Inside of `<…>`, where `>` closes and does not compare.
+    is_in_angles: bool,
     diagnostics: Vec<Diagnostic>,
     /// Made when a message first names a line.
     lines: OnceCell<LineIndex>,
@@ -111,6 +140,9 @@ impl<'a> Parser<'a> {
             end_var_ahead: (0, false),
             is_homeless: false,
             late_vars: Vec::new(),
+            home: Home::default(),
+            outer_homes: Vec::new(),
+            is_in_angles: false,
             diagnostics: Vec::new(),
             lines: OnceCell::new(),
         })
@@ -433,7 +465,10 @@ fn is_unit_end(kind: Kind) -> bool {
 /// Whether a keyword opens a VAR section.
 fn is_var(kind: Kind) -> bool {
     use Kind::*;
-    matches!(kind, Var | VarInput | VarOutput | VarInOut | VarTemp | VarStat | VarInst | VarGlobal | VarExternal | VarConfig | VarAccess)
+    matches!(
+        kind,
+        Var | VarInput | VarOutput | VarInOut | VarTemp | VarStat | VarInst | VarGlobal | VarExternal | VarConfig | VarAccess | VarGeneric
+    )
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! Names keep the spelling of the source; comparing them is case-insensitive and left to the reader. Nodes that could not be read are `Error` nodes,
 //! of which nobody need complain again.
 
-use crate::Span;
+use crate::{Code, Diagnostic, Span};
 
 /// A name as written.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,27 @@ pub struct Pragma {
 pub struct File {
     /// Program units in order.
     pub units: Vec<Unit>,
+    /// `{warning disable W0301} … {warning restore W0301}`.
+    pub suppressed: Vec<Suppressed>,
+}
+
+impl File {
+    /// Whether the file says that this message about it is not wanted.
+    pub fn suppresses(&self, diagnostic: &Diagnostic) -> bool {
+        let place = diagnostic.span.start;
+        self.suppressed.iter().any(|part| part.code == diagnostic.code && part.start <= place && place < part.end)
+    }
+}
+
+/// A part of a file where a warning is not wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suppressed {
+    /// Which.
+    pub code: Code,
+    /// First byte.
+    pub start: u32,
+    /// Behind the last byte.
+    pub end: u32,
 }
 
 /// What may stand at the top of a file.
@@ -47,6 +68,17 @@ pub enum Unit {
     Interface(Interface),
 }
 
+/// Where a unit stands: what `NAMESPACE` and `USING` around it say.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Home {
+    /// The namespaces around it, the outermost first; `NAMESPACE a.b` is two.
+    pub namespace: Vec<Name>,
+    /// The namespaces whose names it uses without prefix, each as a dotted name: those of the file, of the namespaces around it, its own.
+    pub using: Vec<Name>,
+    /// A namespace around it is INTERNAL: other namespaces must not use it.
+    pub is_internal: bool,
+}
+
 /// A global variable list (a VAR_GLOBAL block of a file).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Globals {
@@ -54,6 +86,8 @@ pub struct Globals {
     pub pragmas: Vec<Pragma>,
     /// Variables.
     pub vars: VarBlock,
+    /// Where it stands.
+    pub home: Home,
 }
 
 /// Kind of program unit.
@@ -120,6 +154,8 @@ pub struct Pou {
     pub pragmas: Vec<Pragma>,
     /// Comment before the unit, without its signs.
     pub doc: Option<String>,
+    /// Where it stands.
+    pub home: Home,
     /// From the keyword to the END_.
     pub span: Span,
     /// The END_ keyword (where a fault after the last statement is placed).
@@ -160,6 +196,14 @@ pub struct Property {
     pub get: Option<(Vec<VarBlock>, Vec<Stmt>)>,
     /// SET: declarations and statements. The first block is an input with the name and type of the property: the new value.
     pub set: Option<(Vec<VarBlock>, Vec<Stmt>)>,
+    /// Who may read: the access of GET, that of the property where it has none.
+    pub get_access: Access,
+    /// Who may write: the access of SET, that of the property where it has none.
+    pub set_access: Access,
+    /// Pragmas.
+    pub pragmas: Vec<Pragma>,
+    /// Comment before it.
+    pub doc: Option<String>,
     /// Whole.
     pub span: Span,
 }
@@ -171,6 +215,10 @@ pub struct Action {
     pub name: Name,
     /// Statements.
     pub body: Vec<Stmt>,
+    /// Pragmas.
+    pub pragmas: Vec<Pragma>,
+    /// Comment before it.
+    pub doc: Option<String>,
     /// Whole.
     pub span: Span,
 }
@@ -186,6 +234,12 @@ pub struct Interface {
     pub methods: Vec<Method>,
     /// Properties without bodies.
     pub properties: Vec<Property>,
+    /// Pragmas.
+    pub pragmas: Vec<Pragma>,
+    /// Comment before it.
+    pub doc: Option<String>,
+    /// Where it stands.
+    pub home: Home,
     /// Whole.
     pub span: Span,
 }
@@ -204,6 +258,8 @@ pub enum VarKind {
     Global,
     External,
     Config,
+    /// VAR_GENERIC CONSTANT.
+    Generic,
 }
 
 /// VAR… END_VAR.
@@ -236,6 +292,8 @@ pub struct VarDecl {
     pub init: Option<Init>,
     /// Arguments of FB_Init: `fb : FB(a := 1)`.
     pub fb_init: Vec<Arg>,
+    /// Arguments of FB_Init for each element: `fbs : ARRAY [0..1] OF FB[(a := 1), (a := 2)]`.
+    pub fb_inits: Vec<Vec<Arg>>,
     /// Pragmas before it.
     pub pragmas: Vec<Pragma>,
     /// Comment before it or at the end of its line.
@@ -262,6 +320,8 @@ pub struct TypeDecl {
     pub pragmas: Vec<Pragma>,
     /// Comment before it.
     pub doc: Option<String>,
+    /// Where it stands.
+    pub home: Home,
     /// Whole.
     pub span: Span,
 }
@@ -347,6 +407,13 @@ pub enum TypeExprKind {
     Enum(Box<EnumBody>),
     /// A structure declared in place.
     Struct(Vec<VarDecl>),
+    /// `FB<6>`: a block with values for its VAR_GENERIC constants.
+    Generic {
+        /// The block: the parts of its name in order.
+        path: Vec<Name>,
+        /// Values.
+        values: Vec<Expr>,
+    },
     /// Could not be read.
     Error,
 }
@@ -360,6 +427,16 @@ pub enum Init {
     Array(Vec<InitItem>, Span),
     /// `(x := 1, y := 2)`.
     Struct(Vec<(Name, Init)>, Span),
+}
+
+impl Init {
+    /// Its place.
+    pub fn span(&self) -> Span {
+        match self {
+            Self::Expr(expr) => expr.span,
+            Self::Array(_, span) | Self::Struct(_, span) => *span,
+        }
+    }
 }
 
 /// One item of an array's initial value.
@@ -384,6 +461,10 @@ pub struct Configuration {
     pub programs: Vec<ProgramDecl>,
     /// Names of the resources (empty: tasks stand in the configuration itself).
     pub resources: Vec<Name>,
+    /// VAR_ACCESS: names for communication services, which nobody reads.
+    pub access: Vec<AccessDecl>,
+    /// Where it stands.
+    pub home: Home,
     /// Whole.
     pub span: Span,
 }
@@ -401,15 +482,34 @@ pub struct TaskDecl {
     pub span: Span,
 }
 
+/// `name : path : INT READ_WRITE;` in VAR_ACCESS.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AccessDecl {
+    /// Its name.
+    pub name: Name,
+    /// What it names: a path of variables or a direct address.
+    pub path: Expr,
+    /// Its type.
+    pub ty: TypeExpr,
+    /// READ_WRITE.
+    pub is_writable: bool,
+}
+
 /// PROGRAM inst WITH task : Type;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProgramDecl {
     /// Instance name.
     pub name: Name,
+    /// RETAIN.
+    pub retain: bool,
     /// Task.
     pub task: Option<Name>,
     /// Program type.
     pub ty: Name,
+    /// Blocks of it that run in a task of their own: `fb WITH task`.
+    pub blocks: Vec<(Name, Name)>,
+    /// Connections: `x := GVL.a, y => GVL.b`.
+    pub connections: Vec<Arg>,
     /// Whole.
     pub span: Span,
 }
@@ -586,6 +686,8 @@ pub enum ExprKind {
     Unary(UnaryOp, Box<Expr>),
     /// `a + b`.
     Binary(BinaryOp, Box<Expr>, Box<Expr>),
+    /// A long row `a + b - c …` of operators that are applied from the left: what would make too high a tree of `Binary` nodes.
+    Chain(Box<Expr>, Vec<Link>),
     /// `THIS`.
     This,
     /// `SUPER`.
@@ -598,6 +700,17 @@ pub enum ExprKind {
     Assign(Box<Expr>, Box<Expr>),
     /// Could not be read.
     Error,
+}
+
+/// An operator of a [`ExprKind::Chain`] with what stands right of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Link {
+    /// Which.
+    pub op: BinaryOp,
+    /// Right operand; the left one is all that stands before it.
+    pub right: Expr,
+    /// From the first operand of the chain to this one.
+    pub span: Span,
 }
 
 /// Part of a number.

@@ -64,6 +64,8 @@ pub struct Manifest {
     pub strict: bool,
     /// Bytes of the heap of `__NEW`; 0 if not given.
     pub heap: u32,
+    /// What conditional pragmas find defined, with its values.
+    pub defines: Vec<(String, String)>,
     /// The task that owns the bus, if named.
     pub bus_task: Option<Located<String>>,
     /// Axes in the order of the manifest.
@@ -102,6 +104,7 @@ pub fn read(name: &str, text: &str) -> Result<Manifest, ManifestErrors> {
 
 fn sections(root: &mut Table<'_, '_>, manifest: &mut Manifest) {
     root.section("project", |table| project(table, manifest));
+    root.section("defines", |table| defines(table, &mut manifest.defines));
     root.section("bus", |table| {
         table.choice("kind", &[("sim", ())]);
         manifest.bus_task = table.string("task");
@@ -126,6 +129,16 @@ fn project(table: &mut Table<'_, '_>, manifest: &mut Manifest) {
     manifest.arithmetic = table.choice("arithmetic", &[("codesys", Arithmetic::Codesys), ("iec", Arithmetic::Iec)]).unwrap_or_default();
     manifest.strict = table.boolean("strict").unwrap_or(false);
     manifest.heap = table.number("heap", 16.0..=1073741824.0).map_or(0, |bytes| bytes as u32);
+}
+
+fn defines(table: &mut Table<'_, '_>, defines: &mut Vec<(String, String)>) {
+    for name in table.free_keys() {
+        let is_name = name.value.chars().all(|c| c.is_alphanumeric() || c == '_') && !name.value.is_empty();
+        if !is_name {
+            table.error(name.span, format!("`{}` in [defines] must be a name", name.value), "write for example `SIMULATION = \"\"`");
+        }
+        defines.extend(table.free_string(&name.value).map(|value| (name.value, value.value)));
+    }
 }
 
 fn wires(table: &mut Table<'_, '_>, wires: &mut Vec<Wire>) {

@@ -51,6 +51,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
         heap: project.manifest.heap,
+        defines: project.manifest.defines.clone(),
         conditions: conditions.iter().map(|condition| Source { name: name(condition), text: condition.text.clone() }).collect(),
     };
     let output = takt_compile::compile(takt_compile::Input { sources: &project.sources.list, libraries: LIBRARIES, options: &options });

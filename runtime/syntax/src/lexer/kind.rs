@@ -41,7 +41,7 @@ kinds! {
         Function "FUNCTION", EndFunction "END_FUNCTION", FunctionBlock "FUNCTION_BLOCK", EndFunctionBlock "END_FUNCTION_BLOCK",
         Program "PROGRAM", EndProgram "END_PROGRAM", Type "TYPE", EndType "END_TYPE", Struct "STRUCT", EndStruct "END_STRUCT",
         EndUnion "END_UNION", Var "VAR", VarInput "VAR_INPUT", VarOutput "VAR_OUTPUT", VarInOut "VAR_IN_OUT", VarTemp "VAR_TEMP",
-        VarStat "VAR_STAT", VarInst "VAR_INST", VarGlobal "VAR_GLOBAL", VarExternal "VAR_EXTERNAL", VarConfig "VAR_CONFIG",
+        VarStat "VAR_STAT", VarInst "VAR_INST", VarGlobal "VAR_GLOBAL", VarExternal "VAR_EXTERNAL", VarConfig "VAR_CONFIG", VarGeneric "VAR_GENERIC",
         VarAccess "VAR_ACCESS", EndVar "END_VAR", Array "ARRAY", At "AT", Configuration "CONFIGURATION",
         EndConfiguration "END_CONFIGURATION", EndResource "END_RESOURCE", EndInterface "END_INTERFACE", EndMethod "END_METHOD",
         EndProperty "END_PROPERTY", EndGet "END_GET", EndSet "END_SET", EndAction "END_ACTION", EndClass "END_CLASS",

@@ -48,6 +48,7 @@ pub(super) fn prefix_class(word: &str) -> Option<PrefixClass> {
         ("LREAL", PrefixClass::Number),
         ("STRING", PrefixClass::Text),
         ("WSTRING", PrefixClass::Text),
+        ("UTF8", PrefixClass::Text),
         ("CHAR", PrefixClass::Text),
         ("WCHAR", PrefixClass::Text),
     ];

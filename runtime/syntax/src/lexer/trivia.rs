@@ -22,9 +22,21 @@ pub(crate) struct Comment {
 pub(crate) struct PlacedPragma {
     /// What it says.
     pub pragma: Pragma,
+    /// `{attribute …}`, whose name may be that of a directive.
+    pub is_attribute: bool,
     /// Index of the token that follows.
     pub before: u32,
 }
+
+impl PlacedPragma {
+    /// Whether it acts before the parser and is not for it to see.
+    pub(crate) fn is_directive(&self) -> bool {
+        !self.is_attribute && DIRECTIVES.contains(&self.pragma.name.as_str())
+    }
+}
+
+/// Pragmas that act before the parser.
+const DIRECTIVES: &[&str] = &["if", "elsif", "else", "end_if", "define", "undefine", "error", "warning", "info", "text"];
 
 /// Words that a pragma may begin with. Braces with other contents may be blocks in the manner of C.
 const PRAGMA_WORDS: &[&str] = &[
@@ -127,23 +139,23 @@ impl Scanner<'_> {
         let mut name = word.to_ascii_lowercase();
         let rest = rest.trim();
         let mut value = Some(rest.to_owned()).filter(|rest| !rest.is_empty());
-        match name.as_str() {
-            "region" | "endregion" => return,
-            "if" => {
-                let message = format!("conditional compilation `{{{}}}` is not supported", shorten(text));
-                self.report(Code::NotSupported, start, close + 1, message);
-                return;
-            }
-            "attribute" => {
-                let (attribute, assigned) = rest.split_once(":=").unwrap_or((rest, ""));
-                name = unquote(attribute).to_ascii_lowercase();
-                value = Some(unquote(assigned).to_owned()).filter(|_| !assigned.trim().is_empty());
-            }
-            _ => {}
+        let is_attribute = name == "attribute";
+        if matches!(name.as_str(), "region" | "endregion") {
+            return;
+        }
+        if is_attribute {
+            let (attribute, assigned) = rest.split_once(":=").unwrap_or((rest, ""));
+            name = unquote(attribute).to_ascii_lowercase();
+            value = Some(unquote(assigned).to_owned()).filter(|_| !assigned.trim().is_empty());
+        } else if !PRAGMA_WORDS.contains(&name.as_str()) {
+            let message = format!("the pragma `{{{}}}` is not known and has no effect", shorten(text));
+            self.report(Code::NoEffect, start, close + 1, message);
         }
         let before = self.next_index();
         let span = self.span(start, close + 1);
-        self.out.pragmas.push(PlacedPragma { pragma: Pragma { name, value, span }, before });
+        let placed = PlacedPragma { pragma: Pragma { name, value, span }, is_attribute, before };
+        self.out.has_directives |= placed.is_directive();
+        self.out.pragmas.push(placed);
     }
 }
 
@@ -155,7 +167,7 @@ fn closing_brace(bytes: &[u8], known: bool) -> Option<usize> {
             (None, b'}') => return Some(at),
             (None, b';' | b'\n') if !known => return None,
             // An attribute stands on one line or a few; a forgotten brace must not swallow the program.
-            (_, b'{') => return None,
+            (None, b'{') => return None,
             (None, b'\'' | b'"') => quote = Some(byte),
             (Some(open), _) if byte == open || byte == b'\n' => quote = None,
             _ => {}
@@ -164,7 +176,8 @@ fn closing_brace(bytes: &[u8], known: bool) -> Option<usize> {
     None
 }
 
-fn unquote(text: &str) -> &str {
+/// A text without the quotes around it.
+pub(crate) fn unquote(text: &str) -> &str {
     text.trim().trim_matches(['\'', '"'])
 }
 
@@ -192,9 +205,9 @@ mod tests {
     fn pragmas_are_read() {
         let lexed = lex(FileId(0), "{attribute 'Pack_Mode' := '1'} {region \"x\"} {warning 'w'} {attribute 'a'} b {IF defined(x)}");
         let read: Vec<_> = lexed.pragmas.iter().map(|p| (p.pragma.name.as_str(), p.pragma.value.as_deref(), p.before)).collect();
-        assert_eq!(read, [("pack_mode", Some("1"), 0), ("warning", Some("'w'"), 0), ("a", None, 0)]);
-        assert_eq!(lexed.diagnostics.len(), 1);
-        assert_eq!(lexed.diagnostics[0].code.text(), "E0108");
+        assert_eq!(read, [("pack_mode", Some("1"), 0), ("warning", Some("'w'"), 0), ("a", None, 0), ("if", Some("defined(x)"), 1)]);
+        assert_eq!(lexed.diagnostics, []);
+        assert_eq!(codes("{attribute 'a' := '} {'} {nonsense 1} x"), [("W0101", 25)]);
     }
 
     #[test]

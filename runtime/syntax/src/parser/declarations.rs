@@ -15,15 +15,17 @@ impl Parser<'_> {
         blocks
     }
 
-    /// One VAR section; `None` for a kind that is not supported.
+    /// One VAR section; `None` for VAR_ACCESS, which holds no variables.
     pub(super) fn var_block(&mut self) -> Option<VarBlock> {
         self.failed = false;
         let start = self.bump();
         self.open_block(start, Kind::EndVar);
         let kind = var_kind(start.kind);
         if kind.is_none() {
-            let message = format!("`{}` is not supported", start.kind.text());
-            self.tell(Diagnostic::new(Code::NotSupported, self.span_of(start), message));
+            self.access_declarations();
+            self.close_block();
+            self.eat(Kind::Semi);
+            return None;
         }
         let (mut constant, mut retain, mut persistent) = (false, false, false);
         while let Some(qualifier) = self.qualifier() {
@@ -52,15 +54,17 @@ impl Parser<'_> {
         loop {
             if self.kind() == Kind::Ident {
                 self.respell();
+                self.respell_end();
             }
             let (brackets, before) = (self.brackets, self.at);
             if self.eat(Kind::Semi) {
                 continue;
             }
-            if self.is_block_boundary() {
+            if self.kind().is_reserved() && matches!(self.peek(1).kind, Kind::Colon | Kind::At) && !is_end(self.kind()) {
+                self.keyword_as_name();
+            } else if self.is_block_boundary() {
                 return list;
-            }
-            if self.kind().is_name() {
+            } else if self.kind().is_name() {
                 let declares = matches!(self.peek(1).kind, Kind::Colon | Kind::Comma | Kind::At | Kind::Dot);
                 if !declares && !*is_closed.get_or_insert_with(|| self.is_closed_ahead()) {
                     return list;
@@ -105,7 +109,7 @@ impl Parser<'_> {
         let index = self.at;
         let mut names = Vec::new();
         loop {
-            let name = self.qualified_name("the name of a variable");
+            let name = self.declared_name();
             let at = if self.eat(Kind::At) { self.location() } else { None };
             names.push((name, at));
             if self.failed || !self.eat(Kind::Comma) {
@@ -119,6 +123,8 @@ impl Parser<'_> {
             return;
         }
         let (ty, fb_init) = self.type_with_arguments();
+        let fb_inits = self.arguments_of_elements(&ty);
+        self.refuse_edge();
         let init = self.initializer();
         self.end_declaration();
         let pragmas = self.pragmas(index);
@@ -127,11 +133,30 @@ impl Parser<'_> {
             Some(last) => last,
             None => return,
         };
+        let last = VarDecl { name: last_name, at: last_at, ty, init, fb_init, fb_inits, pragmas, doc };
         for (name, at) in names {
-            let (ty, init, fb_init, pragmas, doc) = (ty.clone(), init.clone(), fb_init.clone(), pragmas.clone(), doc.clone());
-            list.push(VarDecl { name, at, ty, init, fb_init, pragmas, doc });
+            list.push(VarDecl { name, at, ..last.clone() });
         }
-        list.push(VarDecl { name: last_name, at: last_at, ty, init, fb_init, pragmas, doc });
+        list.push(last);
+    }
+
+    /// The name of a variable; in VAR_CONFIG the path of one: `PLC_PRG.lamps[1].on`.
+    fn declared_name(&mut self) -> Name {
+        let mut name = self.qualified_name("the name of a variable");
+        let is_path = self.open.last().is_some_and(|open| open.start.kind == Kind::VarConfig);
+        while is_path && self.kind() == Kind::LBracket && !self.failed {
+            let open = self.bump();
+            while matches!(self.kind(), Kind::Int | Kind::Minus | Kind::Comma) || self.kind().is_name() {
+                self.bump();
+            }
+            self.close(Kind::RBracket, open);
+            if self.eat(Kind::Dot) {
+                self.qualified_name("the name of a member");
+            }
+            name.span = self.span_from(name.span.start);
+            name.text = self.text[name.span.start as usize..name.span.end as usize].split_whitespace().collect();
+        }
+        name
     }
 
     fn location(&mut self) -> Option<crate::tree::Direct> {
@@ -205,6 +230,7 @@ fn var_kind(kind: Kind) -> Option<VarKind> {
         Kind::VarGlobal => VarKind::Global,
         Kind::VarExternal => VarKind::External,
         Kind::VarConfig => VarKind::Config,
+        Kind::VarGeneric => VarKind::Generic,
         _ => return None,
     })
 }

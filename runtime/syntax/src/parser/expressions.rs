@@ -3,20 +3,22 @@
 //! Brackets, calls and `^` bind tightest, then the signs `-`, `+`, `NOT`, then `**`, `* / MOD`, `+ -`, comparisons, `= <>`, `AND`, `XOR`, `OR`;
 //! operators of one rank associate to the left. So `-a ** 2` is `(-a) ** 2`. Operators are kept on a stack of our own: only brackets recurse.
 
-use super::{MAX_HEIGHT, Parser};
+use super::{CHAIN_HEIGHT, MAX_HEIGHT, Parser};
 use crate::lexer::{Kind, Token};
-use crate::tree::{Arg, ArgKind, BinaryOp, Expr, ExprKind, Part, UnaryOp};
+use crate::tree::{Arg, ArgKind, BinaryOp, Expr, ExprKind, Link, Part, UnaryOp};
 use crate::{Code, Diagnostic, Span};
 
 /// An expression and the height of its tree.
 pub(super) struct Tall {
     pub(super) expr: Expr,
     pub(super) height: u32,
+    /// It stood in brackets, so that what follows is not part of its row.
+    pub(super) is_bracketed: bool,
 }
 
 impl Tall {
     fn leaf(kind: ExprKind, span: Span) -> Self {
-        Self { expr: Expr { kind, span }, height: 1 }
+        Self { expr: Expr { kind, span }, height: 1, is_bracketed: false }
     }
 }
 
@@ -46,7 +48,7 @@ impl Parser<'_> {
         }
         let mut waiting: Vec<Waiting> = Vec::new();
         while let Some((op, rank)) = binary_op(self.kind()) {
-            if self.failed {
+            if self.failed || self.is_in_angles && op == BinaryOp::Gt {
                 break;
             }
             let sign = self.bump();
@@ -63,16 +65,31 @@ impl Parser<'_> {
     }
 
     fn join(&mut self, waiting: Option<Waiting>, right: Tall) -> Tall {
-        let Some(Waiting { left, op, .. }) = waiting else { return right };
+        let Some(Waiting { mut left, op, .. }) = waiting else { return right };
         let span = left.expr.span.to(right.expr.span);
-        let height = left.height.max(right.height) + 1;
-        self.tower(height, span, || ExprKind::Binary(op, Box::new(left.expr), Box::new(right.expr)))
+        let is_bracketed = left.is_bracketed;
+        match &mut left.expr.kind {
+            ExprKind::Chain(_, links) if !is_bracketed && right.height < MAX_HEIGHT => {
+                links.push(Link { op, right: right.expr, span });
+                left.expr.span = span;
+                Tall { height: left.height.max(right.height + 1), ..left }
+            }
+            _ if left.height >= CHAIN_HEIGHT => {
+                let height = left.height.max(right.height) + 1;
+                let links = vec![Link { op, right: right.expr, span }];
+                self.tower(height, span, || ExprKind::Chain(Box::new(left.expr), links))
+            }
+            _ => {
+                let height = left.height.max(right.height) + 1;
+                self.tower(height, span, || ExprKind::Binary(op, Box::new(left.expr), Box::new(right.expr)))
+            }
+        }
     }
 
     /// A node of the tree, unless the tree would become too high.
     fn tower(&mut self, height: u32, span: Span, kind: impl FnOnce() -> ExprKind) -> Tall {
         if height <= MAX_HEIGHT {
-            return Tall { expr: Expr { kind: kind(), span }, height };
+            return Tall { expr: Expr { kind: kind(), span }, height, is_bracketed: false };
         }
         let message = format!("an expression of more than {MAX_HEIGHT} nested parts");
         self.tell(Diagnostic::new(Code::TooDeep, self.gap(), message).help("compute it in several statements"));
@@ -238,7 +255,7 @@ impl Parser<'_> {
     }
 
     /// One argument; an input that is named and left open (`IN := ,`) is none.
-    fn argument(&mut self) -> Option<(Arg, u32)> {
+    pub(super) fn argument(&mut self) -> Option<(Arg, u32)> {
         let start = self.token();
         let negated = start.kind == Kind::Not && self.peek(1).kind.is_name() && self.peek(2).kind == Kind::Output;
         if negated {
@@ -325,11 +342,26 @@ impl Parser<'_> {
                 Tall::leaf(ExprKind::Error, span)
             }
             kind if kind.is_name() => self.typed_name(),
+            kind if kind.is_reserved() && !token.starts_line && self.is_lone_keyword() => {
+                let message = format!("expected an expression, found the keyword `{}`", self.text_of(token));
+                self.report(Code::UnexpectedToken, span, message);
+                self.bump();
+                Tall::leaf(ExprKind::Error, span)
+            }
             _ => {
                 self.missing_part("an expression");
                 Tall::leaf(ExprKind::Error, self.gap())
             }
         }
+    }
+
+    /// Whether a keyword stands where a value ends: it was meant as one.
+    fn is_lone_keyword(&self) -> bool {
+        let is_statement = matches!(self.kind(), Kind::Then | Kind::Do | Kind::Of | Kind::To | Kind::By);
+        let next = self.peek(1).kind;
+        !is_statement
+            && !super::is_end(self.kind())
+            && (matches!(next, Kind::Semi | Kind::RParen | Kind::Comma) || binary_op(next).is_some())
     }
 
     /// `E_COLOR#red`, or a name that is a word in other places.
@@ -361,6 +393,7 @@ impl Parser<'_> {
         self.close(Kind::RParen, open);
         if !self.failed {
             inner.expr.span = self.span_from(open.start);
+            inner.is_bracketed = true;
         }
         inner
     }

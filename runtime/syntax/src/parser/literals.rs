@@ -37,7 +37,7 @@ impl Parser<'_> {
                 ExprKind::Error
             }
         };
-        Tall { expr: Expr { kind, span }, height: 1 }
+        Tall { expr: Expr { kind, span }, height: 1, is_bracketed: false }
     }
 }
 
@@ -65,6 +65,8 @@ fn typed(text: &str) -> Result<(Option<&str>, LiteralValue), Fault> {
         "LDT" | "LDATE_AND_TIME" => LiteralValue::Ldt(date_and_time(body)?),
         "BOOL" => return Ok((Some(prefix), truth(body)?)),
         "REAL" | "LREAL" => return Ok((Some(prefix), real(body)?)),
+        // A STRING is UTF-8 anyhow.
+        "UTF8" => text_of_type(body, false)?,
         "STRING" | "CHAR" | "WSTRING" | "WCHAR" => return Ok((Some(prefix), text_of_type(body, upper.starts_with('W'))?)),
         _ => return Ok((Some(prefix), signed(body)?)),
     };

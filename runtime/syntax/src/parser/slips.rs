@@ -52,6 +52,59 @@ impl Parser<'_> {
         self.lexed.tokens[at].kind = *kind;
     }
 
+    /// Corrects `END IF` and the like, and takes the `BEGIN` and `END` of other languages for nothing. `true` if it took something.
+    pub(super) fn respell_end(&mut self) -> bool {
+        let (word, next) = (self.token(), self.peek(1));
+        let is_end = self.is_word(word, "END");
+        if word.kind != Kind::Ident || !(is_end || self.is_word(word, "BEGIN")) {
+            return false;
+        }
+        let text = self.text_of(word);
+        if next.starts_line && word.starts_line {
+            let message = format!("`{text}` is no word of ST");
+            let help = "a body begins behind END_VAR and ends with END_PROGRAM, END_FUNCTION or END_FUNCTION_BLOCK";
+            self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(word), message).help(help));
+            self.bump();
+            return true;
+        }
+        let Some(kind) = end_of(next.kind).filter(|_| is_end && !next.starts_line) else { return false };
+        let message = format!("`{text} {}` is written `{}`", self.text_of(next), kind.text());
+        let span = self.span_of(word).to(self.span_of(next));
+        self.tell(Diagnostic::new(Code::UnexpectedToken, span, message));
+        self.bump();
+        let at = self.at;
+        self.lexed.tokens[at].kind = kind;
+        true
+    }
+
+    /// A keyword in front of `:=` or, in declarations, of `:`: somebody's name for a variable.
+    pub(super) fn keyword_as_name(&mut self) {
+        let word = self.token();
+        let message = format!("expected the name of a variable, found the keyword `{}`", self.text_of(word));
+        self.report(Code::UnexpectedToken, self.span_of(word), message);
+        self.bump();
+    }
+
+    /// `FOR (i = 0; i < 5; i++)`: skipped, as if it were a head of ST.
+    pub(super) fn head_of_c(&mut self) {
+        let open = self.token();
+        let help = "a loop is written `FOR i := 0 TO 4 DO … END_FOR`";
+        let message = "expected the control variable of `FOR`, found `(`";
+        self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(open), message).help(help));
+        let mut depth = 0_usize;
+        loop {
+            match self.bump().kind {
+                Kind::LParen => depth += 1,
+                Kind::RParen => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 || self.token().starts_line || self.kind() == Kind::Eof {
+                break;
+            }
+        }
+        self.eat(Kind::Do);
+    }
+
     /// Whether a misspelled ELSIF is followed by a bracketed condition: `THEN` ends its line.
     fn is_condition_ahead(&self, start: u32) -> bool {
         let is_elsif = self.text.as_bytes()[start as usize..].get(..2).is_some_and(|head| head.eq_ignore_ascii_case(b"el"));
@@ -121,6 +174,7 @@ impl Parser<'_> {
         diagnostic.help = match self.kind() {
             Kind::Then | Kind::Do | Kind::Of => Some("the head of the block before it has been closed already".to_owned()),
             Kind::RParen | Kind::RBracket => Some("no bracket is open here".to_owned()),
+            Kind::Colon if self.previous().kind == Kind::Else => Some("`ELSE` has no `:`".to_owned()),
             _ => None,
         };
         if !self.is_known_trouble() {
@@ -136,6 +190,9 @@ impl Parser<'_> {
             return;
         }
         let next = self.token();
+        if !self.failed && self.has_lexer_spoken() {
+            return;
+        }
         if !self.failed && !self.is_known_trouble() {
             let message = format!("expected `{}`, found {}", word.text(), self.describe(next));
             if matches!(next.kind, Kind::Then | Kind::Do | Kind::Of) {
@@ -155,6 +212,13 @@ impl Parser<'_> {
             self.tell(diagnostic);
         }
         self.recover_head(word, brackets);
+    }
+
+    /// Whether the lexer complained of something between the last token and this one: a brace in the manner of C.
+    fn has_lexer_spoken(&self) -> bool {
+        let (from, to) = (self.previous().end, self.token().start);
+        let index = self.lexed.diagnostics.partition_point(|d| d.span.start < from);
+        self.lexed.diagnostics.get(index).is_some_and(|d| d.span.start < to)
     }
 
     fn ends_head(&self) -> bool {
@@ -189,4 +253,25 @@ impl Parser<'_> {
 fn is_inside_head(kind: Kind) -> bool {
     use Kind::*;
     matches!(kind, To | By | And | Or | Xor | Not | Mod | AndThen | OrElse | True | False | Array)
+}
+
+/// The END_ of the block that a word begins.
+fn end_of(word: Kind) -> Option<Kind> {
+    Some(match word {
+        Kind::If => Kind::EndIf,
+        Kind::Case => Kind::EndCase,
+        Kind::For => Kind::EndFor,
+        Kind::While => Kind::EndWhile,
+        Kind::Repeat => Kind::EndRepeat,
+        Kind::Var => Kind::EndVar,
+        Kind::Struct => Kind::EndStruct,
+        Kind::Type => Kind::EndType,
+        Kind::Function => Kind::EndFunction,
+        Kind::FunctionBlock => Kind::EndFunctionBlock,
+        Kind::Program => Kind::EndProgram,
+        Kind::Method => Kind::EndMethod,
+        Kind::Property => Kind::EndProperty,
+        Kind::Action => Kind::EndAction,
+        _ => return None,
+    })
 }

@@ -18,6 +18,9 @@ impl Parser<'_> {
             let kind = self.kind();
             if kind == Kind::Ident {
                 self.respell();
+                if self.respell_end() {
+                    continue;
+                }
             }
             if self.ends_statements() {
                 if !self.skip_stray() {
@@ -58,9 +61,15 @@ impl Parser<'_> {
         }
     }
 
-    /// METHOD, PROPERTY or ACTION, in front of a name.
+    /// METHOD, PROPERTY or ACTION, in front of a name; or at the start of a line where the name is missing.
     pub(super) fn starts_member(&self) -> bool {
-        matches!(self.kind(), Kind::Method | Kind::Property | Kind::Action) && self.peek(1).kind.is_name() && !self.peek(1).starts_line
+        if !matches!(self.kind(), Kind::Method | Kind::Property | Kind::Action) {
+            return false;
+        }
+        let next = self.peek(1);
+        let is_nameless =
+            self.token().starts_line && next.starts_line && (is_var(next.kind) || is_end(next.kind) && !is_statement_end(next.kind));
+        next.kind.is_name() && !next.starts_line || is_nameless
     }
 
     /// INTERFACE, CLASS, NAMESPACE, USING, in front of a name.
@@ -152,7 +161,8 @@ impl Parser<'_> {
             self.skip_nested();
             return Stmt { kind: StmtKind::Error, span: self.span_of(start) };
         }
-        let is_structured = matches!(start.kind, Kind::If | Kind::Case | Kind::For | Kind::While | Kind::Repeat | Kind::Try);
+        let is_structured = self.peek(1).kind != Kind::Assign
+            && matches!(start.kind, Kind::If | Kind::Case | Kind::For | Kind::While | Kind::Repeat | Kind::Try);
         let kind = self.statement_kind(start);
         self.leave();
         let span = self.span_from(start.start);
@@ -173,6 +183,10 @@ impl Parser<'_> {
     fn statement_kind(&mut self, start: Token) -> StmtKind {
         match start.kind {
             Kind::Semi => StmtKind::Empty,
+            kind if kind.is_reserved() && self.peek(1).kind == Kind::Assign => {
+                self.keyword_as_name();
+                StmtKind::Error
+            }
             Kind::If => self.if_statement(),
             Kind::Case => self.case_statement(),
             Kind::For => self.for_statement(),
@@ -472,6 +486,9 @@ impl Parser<'_> {
         let start = self.bump();
         let brackets = self.brackets;
         self.open_block(start, Kind::EndFor);
+        if self.kind() == Kind::LParen {
+            return self.loop_of_c();
+        }
         let var = self.place();
         if self.kind() == Kind::Eq && !self.failed {
             self.slip_equal("the first value of FOR is assigned with `:=`");
@@ -487,6 +504,14 @@ impl Parser<'_> {
         let body = self.statements();
         self.close_block();
         StmtKind::For { var, from, to, by, body }
+    }
+
+    fn loop_of_c(&mut self) -> StmtKind {
+        let cond = Expr { kind: ExprKind::Error, span: self.span_of(self.token()) };
+        self.head_of_c();
+        let body = self.statements();
+        self.close_block();
+        StmtKind::While { cond, body }
     }
 
     fn while_statement(&mut self) -> StmtKind {

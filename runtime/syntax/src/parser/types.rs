@@ -3,7 +3,9 @@
 use super::Parser;
 use super::slips::is_integer_type;
 use crate::lexer::{Kind, Token};
-use crate::tree::{Arg, ArgKind, EnumBody, Expr, ExprKind, Init, InitItem, LiteralValue, Name, TypeDecl, TypeExpr, TypeExprKind, TypeKind};
+use crate::tree::{
+    Arg, ArgKind, EnumBody, Expr, ExprKind, Home, Init, InitItem, LiteralValue, Name, TypeDecl, TypeExpr, TypeExprKind, TypeKind,
+};
 use crate::{Code, Diagnostic};
 
 impl Parser<'_> {
@@ -35,6 +37,7 @@ impl Parser<'_> {
         match start.kind {
             Kind::Array => self.array_type(),
             Kind::Pointer if self.peek(1).kind == Kind::To => TypeExprKind::Pointer(self.target_type()),
+            Kind::Ident if self.peek(1).kind == Kind::To && self.is_word(start, "REF") => TypeExprKind::Reference(self.target_type()),
             Kind::Reference if self.peek(1).kind == Kind::To => TypeExprKind::Reference(self.target_type()),
             Kind::RefTo => {
                 self.bump();
@@ -42,6 +45,7 @@ impl Parser<'_> {
             }
             Kind::Struct => {
                 self.bump();
+                self.refuse_overlap();
                 TypeExprKind::Struct(self.fields(start, Kind::EndStruct))
             }
             Kind::LParen => TypeExprKind::Enum(Box::new(self.enum_body(None))),
@@ -55,7 +59,7 @@ impl Parser<'_> {
         }
     }
 
-    fn is_word(&self, token: Token, word: &str) -> bool {
+    pub(super) fn is_word(&self, token: Token, word: &str) -> bool {
         self.text_of(token).eq_ignore_ascii_case(word)
     }
 
@@ -128,6 +132,9 @@ impl Parser<'_> {
         while self.eat(Kind::Dot) {
             path.push(self.name("a type behind `.`"));
         }
+        if self.kind() == Kind::Lt && !self.failed {
+            return self.generic_type(path, may_have_arguments, args);
+        }
         if self.kind() != Kind::LParen || self.failed {
             return TypeExprKind::Named(path);
         }
@@ -143,6 +150,41 @@ impl Parser<'_> {
             return TypeExprKind::Named(path);
         }
         self.subrange_or_arguments(path, may_have_arguments, args)
+    }
+
+    /// `FB<6, N>`, and the arguments for its FB_Init.
+    fn generic_type(&mut self, path: Vec<Name>, may_have_arguments: bool, args: &mut Vec<Arg>) -> TypeExprKind {
+        self.bump();
+        let outer = std::mem::replace(&mut self.is_in_angles, true);
+        let mut values = vec![self.expression()];
+        while self.eat(Kind::Comma) {
+            values.push(self.expression());
+        }
+        self.is_in_angles = outer;
+        self.expect(Kind::Gt);
+        if self.kind() == Kind::LParen && may_have_arguments && !self.failed {
+            *args = self.arguments().0;
+        }
+        TypeExprKind::Generic { path, values }
+    }
+
+    /// `[(a := 1), (2)]`: arguments of FB_Init for the elements of an array of blocks.
+    pub(super) fn arguments_of_elements(&mut self, ty: &TypeExpr) -> Vec<Vec<Arg>> {
+        let mut list = Vec::new();
+        let open = self.token();
+        let is_list = open.kind == Kind::LBracket && self.peek(1).kind == Kind::LParen && matches!(ty.kind, TypeExprKind::Array { .. });
+        if !is_list || self.failed {
+            return list;
+        }
+        self.bump();
+        while self.kind() == Kind::LParen && !self.failed {
+            list.push(self.arguments().0);
+            if !self.eat(Kind::Comma) {
+                break;
+            }
+        }
+        self.close(Kind::RBracket, open);
+        list
     }
 
     /// `INT(0..9)` or `FB(1, x)`, which differ behind the first expression.
@@ -217,6 +259,7 @@ impl Parser<'_> {
                 let mut decl = self.type_decl();
                 decl.doc = doc.or(block_doc.take());
                 decl.pragmas = pragmas;
+                decl.home = self.home.clone();
                 list.push(decl);
             } else {
                 self.unexpected_here("the name of a type");
@@ -272,7 +315,7 @@ impl Parser<'_> {
         let kind = self.declared_type(extends);
         let span = self.span_from(start.start);
         self.end_type(&kind);
-        TypeDecl { name, kind, pragmas: Vec::new(), doc: None, span }
+        TypeDecl { name, kind, pragmas: Vec::new(), doc: None, home: Home::default(), span }
     }
 
     /// Takes the `;`, which a structure need not have.
@@ -289,6 +332,7 @@ impl Parser<'_> {
         match start.kind {
             Kind::Struct if !self.failed => {
                 self.bump();
+                self.refuse_overlap();
                 let extends = match self.kind() {
                     Kind::Extends if self.peek(1).kind.is_name() => {
                         self.bump();
@@ -349,7 +393,31 @@ impl Parser<'_> {
             self.report(Code::UnexpectedToken, self.gap(), message);
             return None;
         }
-        Some(self.initial_value())
+        let first = self.initial_value();
+        Some(self.bare_list(first))
+    }
+
+    /// `1, 2, 3(0)` without brackets, as in programs for CoDeSys 2.3.
+    fn bare_list(&mut self, first: Init) -> Init {
+        let start = first.span().start;
+        let mut items = match first {
+            Init::Expr(count) if self.kind() == Kind::LParen && !self.failed && is_number(&count) => vec![self.repeated(count)],
+            first if self.has_more_values() => vec![InitItem::One(first)],
+            first => return first,
+        };
+        while self.has_more_values() {
+            self.bump();
+            items.push(self.array_item());
+        }
+        Init::Array(items, self.span_from(start))
+    }
+
+    /// Whether a `,` and another value follow, and not a field or declaration.
+    fn has_more_values(&self) -> bool {
+        let (value, behind) = (self.peek(1).kind, self.peek(2).kind);
+        let is_value = matches!(value, Kind::Int | Kind::Literal | Kind::True | Kind::False | Kind::Minus | Kind::LParen | Kind::LBracket)
+            || value.is_name() && matches!(behind, Kind::Comma | Kind::Semi | Kind::RParen | Kind::Dot | Kind::Hash);
+        !self.failed && self.kind() == Kind::Comma && is_value
     }
 
     fn initial_value(&mut self) -> Init {
@@ -379,7 +447,8 @@ impl Parser<'_> {
             if self.failed {
                 break;
             }
-            fields.push((name, self.initial_value()));
+            let first = self.initial_value();
+            fields.push((name, self.bare_list(first)));
             if !self.eat(Kind::Comma) {
                 break;
             }
@@ -410,7 +479,7 @@ impl Parser<'_> {
         let init = self.initial_value();
         match init {
             Init::Expr(count) if self.kind() == Kind::LParen && !self.failed => {
-                if !matches!(&count.kind, ExprKind::Literal(literal) if matches!(literal.value, LiteralValue::Int(_))) {
+                if !is_number(&count) {
                     self.tell(Diagnostic::new(Code::UnexpectedToken, count.span, "expected the number of repetitions before `(`"));
                 }
                 self.repeated(count)
@@ -439,4 +508,8 @@ impl Parser<'_> {
         self.close(Kind::RParen, open);
         InitItem::Repeat(count, values)
     }
+}
+
+fn is_number(expr: &Expr) -> bool {
+    matches!(&expr.kind, ExprKind::Literal(literal) if matches!(literal.value, LiteralValue::Int(_)))
 }

@@ -13,11 +13,12 @@ impl Parser<'_> {
             let before = self.at;
             self.unit(&mut file.units);
             self.failed = false;
-            self.open.clear();
+            self.open.truncate(self.outer_homes.len());
             if self.at == before {
                 self.bump();
             }
         }
+        self.end_namespaces();
         file
     }
 
@@ -29,40 +30,54 @@ impl Parser<'_> {
             Kind::Type => units.extend(self.type_block().into_iter().map(Unit::Type)),
             Kind::VarGlobal | Kind::VarConfig => {
                 let pragmas = self.pragmas(self.at);
-                units.extend(self.var_block().map(|vars| Unit::Globals(Globals { pragmas, vars })));
+                let home = self.home.clone();
+                units.extend(self.var_block().map(|vars| Unit::Globals(Globals { pragmas, vars, home })));
             }
             Kind::Configuration => units.push(Unit::Configuration(self.configuration())),
             Kind::Class if self.starts_soft_unit() => units.push(Unit::Pou(self.pou(PouKind::FunctionBlock, Kind::EndClass))),
             Kind::Interface if self.starts_soft_unit() => units.push(Unit::Interface(self.interface())),
-            Kind::Namespace | Kind::Using if self.starts_soft_unit() => self.namespace(),
+            Kind::Namespace if self.starts_soft_unit() => self.enter_namespace(),
+            Kind::Using if self.starts_soft_unit() => {
+                let names = self.using();
+                self.home.using.extend(names);
+            }
             Kind::Method | Kind::Property | Kind::Action if self.starts_member() => self.member_behind(units),
-            Kind::EndNamespace | Kind::Semi => {
+            Kind::EndNamespace => self.leave_namespace(),
+            Kind::Semi => {
                 self.bump();
             }
             _ => self.homeless(),
         }
     }
 
-    /// NAMESPACE and USING: the units inside are read as if it were not there.
-    fn namespace(&mut self) {
-        let word = self.bump();
-        let message = format!("`{}` is not supported", word.kind.text());
-        self.tell(Diagnostic::new(Code::NotSupported, self.span_of(word), message));
-        self.qualified_name("a name");
-        self.eat(Kind::Semi);
-    }
-
     /// A METHOD, PROPERTY or ACTION behind the END_ of its block.
     fn member_behind(&mut self, units: &mut [Unit]) {
         let word = self.token();
-        if let Some(Unit::Pou(pou)) = units.last_mut() {
-            return self.member_of(pou);
+        let (owner, member) = self.unit_member();
+        let pou = match &owner {
+            None => match units.last_mut() {
+                Some(Unit::Pou(pou)) => Some(pou),
+                _ => None,
+            },
+            Some(owner) => units.iter_mut().rev().find_map(|unit| match unit {
+                Unit::Pou(pou) if pou.name.text.eq_ignore_ascii_case(&owner.text) => Some(pou),
+                _ => None,
+            }),
+        };
+        if let Some(pou) = pou {
+            return member.join(pou);
         }
-        let message = format!("`{}` belongs to no program unit", word.kind.text());
-        let help = "it stands inside of its FUNCTION_BLOCK or PROGRAM or directly behind it";
-        self.tell(Diagnostic::new(Code::UnexpectedToken, self.span_of(word), message).help(help));
-        let mut nobody = self.empty_pou(PouKind::FunctionBlock, word);
-        self.member_of(&mut nobody);
+        let span = self.span_of(word);
+        let diagnostic = match owner {
+            None => Diagnostic::new(Code::UnexpectedToken, span, format!("`{}` belongs to no program unit", word.kind.text()))
+                .help("it stands inside of its FUNCTION_BLOCK or PROGRAM or directly behind it"),
+            Some(owner) => {
+                let message = format!("expected the name of a unit of this file before `.`, found `{}`", owner.text);
+                Diagnostic::new(Code::UnexpectedToken, owner.span, message)
+                    .help("a member stands inside of its FUNCTION_BLOCK or PROGRAM or in the same file behind it")
+            }
+        };
+        self.tell(diagnostic);
     }
 
     fn empty_pou(&self, kind: PouKind, start: Token) -> Pou {
@@ -81,6 +96,7 @@ impl Parser<'_> {
             actions: Vec::new(),
             pragmas: Vec::new(),
             doc: None,
+            home: self.home.clone(),
             span,
             end: span,
         }
@@ -138,9 +154,15 @@ impl Parser<'_> {
         } else {
             pou.name = self.name("the name of the unit");
         }
+        let using = self.using();
+        pou.home.using.extend(using);
+        if self.kind() == Kind::VarGeneric && !self.failed {
+            pou.vars.extend(self.var_block());
+        }
         if self.kind() == Kind::Extends && !self.failed {
             self.bump();
             pou.extends = Some(self.qualified_name("the name of a block"));
+            self.refuse_generic_base();
         }
         if self.kind() == Kind::Implements && !self.failed {
             self.bump();
@@ -150,6 +172,8 @@ impl Parser<'_> {
             pou.result = Some(self.type_expr());
         }
         self.end_header();
+        let using = self.using();
+        pou.home.using.extend(using);
         self.pou_contents(&mut pou);
         pou.end = self.end_of_block();
         pou.span = self.span_from(start.start);
@@ -157,8 +181,10 @@ impl Parser<'_> {
     }
 
     fn pou_contents(&mut self, pou: &mut Pou) {
-        pou.vars = self.var_blocks();
+        let vars = self.var_blocks();
+        pou.vars.extend(vars);
         loop {
+            self.foreign_body();
             let body = self.statements();
             pou.body.extend(body);
             pou.vars.append(&mut self.late_vars);
@@ -167,6 +193,19 @@ impl Parser<'_> {
             }
             self.member_of(pou);
         }
+    }
+
+    /// `EXTENDS Base<6>`.
+    fn refuse_generic_base(&mut self) {
+        if self.kind() != Kind::Lt || self.failed {
+            return;
+        }
+        let open = self.bump();
+        self.tell(Diagnostic::new(Code::NotSupported, self.span_of(open), "values for a generic base block are not supported"));
+        while !matches!(self.kind(), Kind::Gt | Kind::Eof) && !self.token().starts_line {
+            self.bump();
+        }
+        self.eat(Kind::Gt);
     }
 
     /// Closes the innermost block; the place of its END_, or where it is missing.
@@ -189,7 +228,14 @@ impl Parser<'_> {
         let is_sign =
             !next.kind.is_name() && !next.kind.is_reserved() && !matches!(next.kind, Kind::Eof | Kind::Dot | Kind::Direct | Kind::Bad);
         if !self.failed && !next.starts_line && (is_lone_name || is_sign) {
-            self.unexpected_here("the end of the line or `:` and a type");
+            let mut diagnostic = self.unexpected("the end of the line or `:` and a type");
+            if next.kind == Kind::LParen {
+                diagnostic.help = Some("parameters are declared in VAR_INPUT … END_VAR".to_owned());
+            }
+            if !self.is_known_trouble() {
+                self.tell(diagnostic);
+            }
+            self.failed = true;
         }
         if self.failed {
             while !self.token().starts_line && !self.starts_unit() && !is_var(self.kind()) && !is_end(self.kind()) {
@@ -228,8 +274,10 @@ impl Parser<'_> {
     }
 
     fn interface(&mut self) -> Interface {
+        let index = self.at;
         let start = self.bump();
         self.open_block(start, Kind::EndInterface);
+        let (pragmas, doc) = (self.pragmas(index), self.doc_before(index));
         self.modifiers();
         let name = self.name("the name of the interface");
         let extends = if self.kind() == Kind::Extends && !self.failed {
@@ -241,7 +289,7 @@ impl Parser<'_> {
         self.end_header();
         let mut holder = self.empty_pou(PouKind::FunctionBlock, start);
         while self.starts_member() && self.kind() != Kind::Action {
-            self.member_of(&mut holder);
+            self.unit_member().1.join(&mut holder);
         }
         if !is_end(self.kind()) && !self.starts_unit() {
             self.tell(self.unexpected("`METHOD`, `PROPERTY` or `END_INTERFACE`"));
@@ -251,6 +299,7 @@ impl Parser<'_> {
         }
         self.end_of_block();
         let span = self.span_from(start.start);
-        Interface { name, extends, methods: holder.methods, properties: holder.properties, span }
+        let Pou { methods, properties, home, .. } = holder;
+        Interface { name, extends, methods, properties, pragmas, doc, home, span }
     }
 }

@@ -32,6 +32,16 @@ fn axes_keep_the_order_of_the_text() {
 }
 
 #[test]
+fn defines_are_names_with_texts() {
+    let manifest = read("takt.toml", "[defines]\nSIM = \"\"\nTARGET = \"cell 3\"\n").unwrap();
+    let mut defines = manifest.defines;
+    defines.sort();
+    assert_eq!(defines, [("SIM".to_owned(), String::new()), ("TARGET".to_owned(), "cell 3".to_owned())]);
+    check("[defines]\n\"a b\" = \"1\"\n", 2, "`a b` in [defines] must be a name");
+    check("[defines]\nA = 1\n", 2, "`A`");
+}
+
+#[test]
 fn every_mistake_has_its_line_and_a_way_out() {
     check("[projet]\n", 1, "unknown key `projet` in the manifest (did you mean `project`?)");
     check("[project]\nsouces = [\"src\"]\n", 2, "unknown key `souces` in [project] (did you mean `sources`?)");

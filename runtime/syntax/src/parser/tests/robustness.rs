@@ -30,7 +30,6 @@ fn depth_is_bounded_and_said_once() {
         too_deep(body(format!("a := b{};", "[1]".repeat(N))));
         too_deep(body(format!("a := {}1{};", "b[".repeat(N), "]".repeat(N))));
         too_deep(body(format!("a := {}1{};", "f(".repeat(N), ")".repeat(N))));
-        too_deep(body(format!("a := 1{};", " + 1".repeat(N))));
         too_deep(body(format!("{}{}", "IF a THEN ".repeat(N), "END_IF ".repeat(N))));
         too_deep(body(format!("{}{} b := 1;", "FOR i := 1 TO 2 DO CASE x OF 1: ".repeat(N / 2), "END_CASE END_FOR ".repeat(N / 2))));
         too_deep(format!("PROGRAM p VAR a : {}INT; END_VAR END_PROGRAM", "POINTER TO ".repeat(N)));
@@ -38,6 +37,33 @@ fn depth_is_bounded_and_said_once() {
         too_deep(format!("PROGRAM p VAR a : INT := {}1{}; END_VAR END_PROGRAM", "[".repeat(N), "]".repeat(N)));
         too_deep(format!("PROGRAM p VAR a : INT := {}1{}; END_VAR END_PROGRAM", "(x := ".repeat(N), ")".repeat(N)));
     });
+}
+
+#[test]
+fn rows_of_operators_have_no_bound() {
+    on_small_stack(|| {
+        const N: usize = 100_000;
+        for row in [" + 1", " - 1.0 * b", " AND NOT (c OR d)", " OR b AND c", " = 1", " ** 2", " + (1 + 2)"] {
+            let text = format!("PROGRAM p a := 1{}; END_PROGRAM", row.repeat(N));
+            let file = clean(&text);
+            assert_eq!(file.clone(), file);
+        }
+        let nested = "(".repeat(30) + "1" + &format!("{})", " + 1".repeat(300)).repeat(30);
+        clean(&format!("PROGRAM p a := {nested}; END_PROGRAM"));
+    });
+}
+
+#[test]
+fn a_long_row_is_applied_from_the_left() {
+    let row: Vec<String> = (0..300).map(|i| format!("a{i}")).collect();
+    let expected = row.iter().skip(1).fold(row[0].clone(), |left, right| format!("({left} Sub {right})"));
+    check_expr(&row.join(" - "), &expected);
+    let expected = row.iter().skip(1).fold(row[0].clone(), |left, right| format!("({left} Sub ({right} Mul 2))"));
+    check_expr(&(row.join(" * 2 - ") + " * 2").replacen("a0 * 2", "a0", 1), &expected);
+    check_expr(
+        &format!("({}) - b", row.join(" - ")),
+        &format!("({} Sub b)", row.iter().skip(1).fold(row[0].clone(), |l, r| format!("({l} Sub {r})"))),
+    );
 }
 
 #[test]

@@ -1,0 +1,60 @@
+//! NAMESPACE and USING: where the units of a file stand.
+//!
+//! The tree stays a flat list; each unit carries its [`Home`](crate::tree::Home).
+
+use super::Parser;
+use crate::lexer::Kind;
+use crate::tree::Name;
+use crate::{Code, Diagnostic};
+
+impl Parser<'_> {
+    /// `NAMESPACE INTERNAL a.b`: what follows, up to END_NAMESPACE, stands in it.
+    pub(super) fn enter_namespace(&mut self) {
+        let start = self.bump();
+        self.outer_homes.push(self.home.clone());
+        self.open_block(start, Kind::EndNamespace);
+        while matches!(self.kind(), Kind::Internal | Kind::Public) && self.peek(1).kind.is_name() {
+            self.home.is_internal |= self.bump().kind == Kind::Internal;
+        }
+        loop {
+            let name = self.name("the name of the namespace");
+            self.home.namespace.push(name);
+            if !self.eat(Kind::Dot) {
+                break;
+            }
+        }
+        self.eat(Kind::Semi);
+    }
+
+    /// END_NAMESPACE.
+    pub(super) fn leave_namespace(&mut self) {
+        let Some(home) = self.outer_homes.pop() else {
+            let span = self.span_of(self.token());
+            self.tell(Diagnostic::new(Code::UnexpectedToken, span, "`END_NAMESPACE` belongs to no open NAMESPACE"));
+            self.bump();
+            return;
+        };
+        self.home = home;
+        self.close_block();
+        self.eat(Kind::Semi);
+    }
+
+    /// Namespaces that are open at the end of the file.
+    pub(super) fn end_namespaces(&mut self) {
+        while let Some(home) = self.outer_homes.pop() {
+            self.home = home;
+            self.close_block();
+        }
+    }
+
+    /// `USING a.b, c;` as often as it stands here.
+    pub(super) fn using(&mut self) -> Vec<Name> {
+        let mut names = Vec::new();
+        while self.kind() == Kind::Using && self.peek(1).kind.is_name() && !self.failed {
+            self.bump();
+            names.extend(self.name_list());
+            self.eat(Kind::Semi);
+        }
+        names
+    }
+}
