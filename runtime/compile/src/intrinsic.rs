@@ -2,7 +2,7 @@
 
 use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand, Thing};
-use crate::operator::{Class, common_int};
+use crate::operator::{Class, common_int, is_unsigned_64};
 use crate::scope::{Item, key};
 use crate::types::elementary;
 use takt_abi::Elem;
@@ -33,7 +33,6 @@ const OPERATOR_FUNCTIONS: &[(&str, BinaryOp)] = &[
     ("MUL", BinaryOp::Mul),
     ("DIV", BinaryOp::Div),
     ("MOD", BinaryOp::Mod),
-    ("EXPT", BinaryOp::Power),
     ("AND", BinaryOp::And),
     ("OR", BinaryOp::Or),
     ("XOR", BinaryOp::Xor),
@@ -81,6 +80,7 @@ impl<'a> Lowering<'_, 'a> {
     fn is_intrinsic(&self, name: &str) -> bool {
         const OTHERS: &[&str] = &[
             "ABS",
+            "EXPT",
             "MIN",
             "MAX",
             "LIMIT",
@@ -153,6 +153,10 @@ impl<'a> Lowering<'_, 'a> {
             return rest.fold(first, |a, b| self.binary(*op, a, b, span));
         }
         match name {
+            "EXPT" => {
+                let exponent = operands.remove(1);
+                self.expt(operands.remove(0), exponent, span)
+            }
             "ABS" => self.abs(operands.remove(0), span),
             "NOT" => self.unary(UnaryOp::Not, operands.remove(0), span),
             "MOVE" => operands.remove(0),
@@ -212,11 +216,12 @@ impl<'a> Lowering<'_, 'a> {
 
     fn abs(&mut self, a: Operand, span: Span) -> Operand {
         match self.class(a.ty) {
+            Class::Int(e) if is_unsigned_64(e) => a,
             Class::Int(_) => {
-                let ty = a.ty;
                 let flex = a.flex;
-                let result = self.fold_or_emit(Op::Abs, &[&a], ty, span);
-                Operand { exact: false, flex, ..result }
+                let result = self.fold_or_emit(Op::Abs, &[&a], a.ty, span);
+                let result = Operand { flex, ..result };
+                self.computed(result)
             }
             Class::Real(e) => {
                 let result = self.fold_or_emit(if e == Elem::Real { Op::AbsF32 } else { Op::AbsF64 }, &[&a], a.ty, span);
@@ -236,8 +241,9 @@ impl<'a> Lowering<'_, 'a> {
                 (Class::Int(_), Class::Int(_)) if flex => operand.ty,
                 (Class::Int(_), Class::Int(_)) if operand.flex => ty,
                 (Class::Int(a), Class::Int(b)) => self.c.elem(common_int(a, b)),
-                (Class::Real(_), Class::Int(_)) => ty,
-                (Class::Int(_), Class::Real(_)) => operand.ty,
+                (Class::Real(_), Class::Int(e)) if operand.flex || takt_ir::elem_size(e) < 8 => ty,
+                (Class::Int(e), Class::Real(_)) if flex || takt_ir::elem_size(e) < 8 => operand.ty,
+                (Class::Real(_), Class::Int(_)) | (Class::Int(_), Class::Real(_)) => self.c.elem(Elem::Lreal),
                 (Class::Real(_), Class::Real(_)) if flex => operand.ty,
                 (Class::Real(_), Class::Real(_)) if operand.flex => ty,
                 (Class::Real(_), Class::Real(_)) => self.c.elem(Elem::Lreal),
@@ -594,7 +600,7 @@ fn counts(name: &str) -> (usize, usize) {
         "MIN" | "MAX" | "ADD" | "MUL" | "AND" | "OR" | "XOR" => (2, usize::MAX),
         "MUX" => (2, usize::MAX),
         "LIMIT" | "SEL" => (3, 3),
-        "SHL" | "SHR" | "ROL" | "ROR" | "ATAN2" => (2, 2),
+        "SHL" | "SHR" | "ROL" | "ROR" | "ATAN2" | "EXPT" => (2, 2),
         _ if OPERATOR_FUNCTIONS.iter().any(|(n, _)| *n == name) => (2, 2),
         _ => (1, 1),
     }

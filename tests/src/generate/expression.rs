@@ -166,7 +166,7 @@ impl Generator {
     }
 
     fn power(&mut self, path: &str, d: usize) -> String {
-        if self.random.chance(50) { format!("EXPT({path}, {})", self.int(d)) } else { format!("({path} ** {})", self.int(d)) }
+        if self.random.chance(50) { format!("TO_LINT(EXPT({path}, {}))", self.int(d)) } else { format!("({path} ** {})", self.int(d)) }
     }
 
     /// A part of an integer variable.
