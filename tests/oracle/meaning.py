@@ -119,6 +119,32 @@ def truncated(a, b):
     return -quotient if (a < 0) != (b < 0) else quotient
 
 
+def literal(number, beside):
+    """An integer literal takes the type beside it if that holds it, else the smallest of its own."""
+    names = [beside] if beside in INTEGERS else []
+    for name in (*names, "INT", "DINT", "LINT", "ULINT"):
+        low, high = integer_range(name)
+        if low <= number <= high:
+            return Value(name, number & MASK)
+    raise ValueError(number)
+
+
+def implicit(source, target):
+    """What is said of `x := y`: nothing (`.`), that it may lose information (`w`), that there is no such conversion (`e`)."""
+    if source == target:
+        return "."
+    if source in INTEGERS and target in INTEGERS:
+        (low, high), (least, most) = integer_range(source), integer_range(target)
+        return "." if least <= low and high <= most else "w"
+    if source in INTEGERS and target in REALS:
+        return "." if width(source) <= REALS[target][1] + 1 else "w"
+    if source in REALS and (target in REALS or target in INTEGERS):
+        return "." if target == "LREAL" else "w"
+    if source in DURATIONS and target in DURATIONS:
+        return "." if target == "LTIME" else "w"
+    return "e"
+
+
 class Language:
     """The operators in one of the two arithmetics."""
 

@@ -8,7 +8,7 @@ The first lines name lists of operand bits: `values TYPE LIST bits…` (hexadeci
 
 with operands `TYPE.LIST` for `{a}`, `{b}`, `{c}`; several groups of operands stand beside each other where their cells are equal. The cells follow
 the operands' lists, the last one fastest: bits of the target in hexadecimal, `!` for a division by zero, `?` where the table does not say. Cells of
-a BOOL stand without spaces.
+a BOOL stand without spaces. `implicit SOURCE TARGET.` says what the compiler says of an assignment: nothing (`.`), a warning (`w`), an error (`e`).
 """
 
 import itertools
@@ -16,8 +16,8 @@ import sys
 from fractions import Fraction
 
 import rational
-from meaning import (CLOCKS, DATES, DAY, DURATIONS, ELEMENTARY, INTEGERS, REALS, TIMES, Fault, Language, Unknown, integer_range, load, shape,
-                     width)
+from meaning import (CLOCKS, DATES, DAY, DURATIONS, ELEMENTARY, INTEGERS, REALS, TIMES, Fault, Language, Unknown, Value, implicit,
+                     integer_range, literal, load, shape, to_integer, width)
 
 COMPARISONS = ["=", "<>", "<", "<=", ">", ">="]
 
@@ -89,6 +89,7 @@ class Table:
     def __init__(self):
         self.lists = {}
         self.lines = {}
+        self.verdicts = []
 
     def operand(self, name, which):
         key = f"{name}.{which}"
@@ -115,12 +116,17 @@ class Table:
             joined = "".join(cells) if target == "BOOL" else " ".join(cells)
             self.lines.setdefault((name, target, template, joined), []).append(",".join(keys))
 
+    def implicit(self, source, target):
+        self.verdicts.append((source, target, implicit(source, target)))
+
     def write(self, out):
         for key, bits in self.lists.items():
             name, which = key.split(".")
             out.write(f"values {name} {which} {' '.join(f'{b:x}' for b in bits)}\n")
         for (arithmetic, target, template, cells), groups in self.lines.items():
             out.write(f"{arithmetic} {target} | {' '.join(groups)} | {template} | {cells}\n")
+        for source, group in itertools.groupby(self.verdicts, lambda v: v[0]):
+            out.write(f"implicit {source} {' '.join(target + verdict for _, target, verdict in group)}\n")
 
 
 BOTH = ("codesys", "iec")
@@ -185,7 +191,7 @@ def reals(table):
         table.add(CODESYS, "-{a}", lambda m, x: m.negative(x), one, [a])
         table.add(CODESYS, "ABS({a})", lambda m, x: m.absolute(x), one, [a])
         table.add(CODESYS, "SQRT({a})", lambda m, x: type(x)(x.type, rational.square_root(x.data, REALS[x.type])), one, [a])
-        truncation = lambda m, x: load("LINT", int_of(rational.whole(x.data, "trunc")))  # noqa: E731
+        truncation = lambda m, x: load("LINT", to_integer(rational.whole(x.data, "trunc")))  # noqa: E731
         table.add(CODESYS, "TRUNC({a})", lambda m, x: m.convert(truncation(m, x), "DINT"), one, ["LINT"])
         table.add(CODESYS, "TRUNC_INT({a})", lambda m, x: m.convert(truncation(m, x), "INT"), one, ["LINT"])
         for name in ("FLOOR", "CEIL"):
@@ -193,12 +199,6 @@ def reals(table):
         few = [(a, "few")] * 3
         table.add(CODESYS, "LIMIT({a}, {b}, {c})", lambda m, x, y, z: m.limit(x, y, z), few, [a])
         table.add(CODESYS, "SEL({a} < {b}, {b}, {c})", lambda m, x, y, z: m.select(m.compare("<", x, y), y, z), few, [a])
-
-
-def int_of(value):
-    """As a conversion saturates, of a value without fraction."""
-    from meaning import to_integer
-    return to_integer(value)
 
 
 def booleans(table):
@@ -244,11 +244,32 @@ def times(table):
             table.add(CODESYS, f"{{a}} {sign} {{b}}", lambda m, x, y: m.moved(sign, x, y), [(a, "small"), (span, "small")], [a])
 
 
+def literals(table):
+    """A literal beside a variable."""
+    for a in INTEGERS:
+        one = [(a, "full")]
+        for sign, number in itertools.product(("+", "-", "*", "/", "MOD"), (1, 10, -3, 200, 70000)):
+            table.add(BOTH, f"{{a}} {sign} {number}", lambda m, x: m.arithmetic(sign, x, literal(number, x.type)), one, ["LINT"])
+            if sign in "-*":
+                table.add(BOTH, f"{number} {sign} {{a}}", lambda m, x: m.arithmetic(sign, literal(number, x.type), x), one, ["LINT"])
+        for sign, number in itertools.product(("<", "=", ">="), (0, -1, 200, 70000)):
+            table.add(CODESYS, f"{{a}} {sign} {number}", lambda m, x: m.compare(sign, x, literal(number, x.type)), one, ["BOOL"])
+        half = Value("LREAL", rational.number(Fraction(1, 2)))
+        table.add(CODESYS, "{a} * 0.5", lambda m, x: m.arithmetic("*", x, half), one, ["LREAL"])
+        table.add(CODESYS, "{a} + 1 > {a}", lambda m, x: m.compare(">", m.arithmetic("+", x, literal(1, x.type)), x), one, ["BOOL"])
+    for a in REALS:
+        tenth = rational.rounded(rational.number(Fraction(1, 10)), REALS[a])
+        for sign in ("+", "*", "/"):
+            table.add(CODESYS, f"{{a}} {sign} 0.1", lambda m, x: m.arithmetic(sign, x, Value(x.type, tenth)), [(a, "full")], ["LREAL"])
+            table.add(CODESYS, f"{{a}} {sign} 3", lambda m, x: m.arithmetic(sign, x, literal(3, "INT")), [(a, "full")], ["LREAL"])
+
+
 def conversions(table):
     for a, b in itertools.product(ELEMENTARY, repeat=2):
         if a != b:
             table.add(CODESYS, f"{a}_TO_{b}({{a}})", lambda m, x: m.convert(x, b), [(a, "full")], [b])
             table.add(CODESYS, f"TO_{b}({{a}})", lambda m, x: m.convert(x, b), [(a, "few" if a not in TIMES else "small")], [b])
+            table.implicit(a, b)
     numbers = [*INTEGERS, *REALS]
     for a, b in [*itertools.product(numbers, repeat=2), *itertools.product(DURATIONS, repeat=2)]:
         table.add(CODESYS, "{a}", lambda m, x: x, [(a, "full")], [b])
@@ -256,7 +277,7 @@ def conversions(table):
 
 def main():
     table = Table()
-    for part in (integers, single_integers, reals, booleans, times, conversions):
+    for part in (integers, single_integers, reals, booleans, times, literals, conversions):
         part(table)
     sys.stdout.write("# Written by tests/oracle/table.py, which says what it means.\n")
     table.write(sys.stdout)

@@ -8,9 +8,13 @@ mod table;
 #[path = "meaning/variables.rs"]
 mod variables;
 
+use std::collections::HashMap;
+use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use table::{Table, Unit};
+use takt_compile::Options;
+use takt_tests::bench;
 
 /// Units of one program.
 const BATCH: usize = 24;
@@ -66,4 +70,41 @@ fn constants_are_folded_to_what_is_computed() {
 #[test]
 fn divisions_by_a_constant_zero_are_reported() {
     in_batches(|table, batch| (0, constants::refused(table, batch)));
+}
+
+/// What the compiler says of each assignment of the table, in lines of their own.
+fn said(table: &Table, strict: bool) -> Vec<char> {
+    let mut source = String::from("PROGRAM main VAR");
+    let mut types: Vec<&String> = table.implicit.iter().map(|(source, ..)| source).collect();
+    types.dedup();
+    for ty in types {
+        let _ = write!(source, " v_{ty} : {ty};");
+    }
+    source.push_str(" END_VAR\n");
+    for (from, to, _) in &table.implicit {
+        let _ = writeln!(source, "v_{to} := v_{from};");
+    }
+    source.push_str("END_PROGRAM\n");
+    let found = bench::found(&bench::compile_with(&source, &Options { strict, ..Options::default() }));
+    let codes: HashMap<usize, String> = found.into_iter().map(|d| (d.line, d.code)).collect();
+    let verdict = |line: usize| codes.get(&line).map_or('.', |code| if code == "W0301" { 'w' } else { 'e' });
+    (0..table.implicit.len()).map(|i| verdict(i + 2)).collect()
+}
+
+#[test]
+fn implicit_conversions_are_silent_warned_of_or_refused() {
+    let table = read();
+    assert!(table.implicit.len() > 500, "{} pairs", table.implicit.len());
+    for strict in [false, true] {
+        let wrong: Vec<String> = table
+            .implicit
+            .iter()
+            .zip(said(&table, strict))
+            .filter_map(|((from, to, verdict), said)| {
+                let expected = if strict && *verdict == 'w' { 'e' } else { *verdict };
+                (said != expected).then(|| format!("{to} := {from}: expected {expected}, found {said} (strict: {strict})"))
+            })
+            .collect();
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
 }

@@ -49,17 +49,20 @@ pub struct Unit<'a> {
 pub struct Table {
     /// By name, `INT.small`.
     pub lists: HashMap<String, List>,
+    /// Source, target and what is said of the assignment: `.`, `w` or `e`.
+    pub implicit: Vec<(String, String, char)>,
     lines: Vec<(bool, Vec<Vec<String>>, Line)>,
 }
 
 impl Table {
     /// Reads the file's text.
     pub fn read(text: &str) -> Self {
-        let mut table = Self { lists: HashMap::new(), lines: Vec::new() };
+        let mut table = Self { lists: HashMap::new(), implicit: Vec::new(), lines: Vec::new() };
         for line in text.lines().filter(|l| !l.starts_with('#')) {
-            match line.strip_prefix("values ") {
-                Some(list) => table.list(list),
-                None => table.line(line),
+            match (line.strip_prefix("values "), line.strip_prefix("implicit ")) {
+                (Some(list), _) => table.list(list),
+                (_, Some(verdicts)) => table.verdicts(verdicts),
+                _ => table.line(line),
             }
         }
         table
@@ -70,6 +73,14 @@ impl Table {
         let (ty, name) = (words.next().expect("a type"), words.next().expect("a list"));
         let bits = words.map(|w| u64::from_str_radix(w, 16).expect("bits")).collect();
         self.lists.insert(format!("{ty}.{name}"), List { ty: ty.into(), bits });
+    }
+
+    fn verdicts(&mut self, text: &str) {
+        let (source, targets) = text.split_once(' ').expect("a source");
+        for target in targets.split(' ') {
+            let (target, verdict) = target.split_at(target.len() - 1);
+            self.implicit.push((source.into(), target.into(), verdict.chars().next().expect("a verdict")));
+        }
     }
 
     fn line(&mut self, text: &str) {
