@@ -93,7 +93,7 @@ impl Lowering<'_, '_> {
         }
         let (fl, fh) = range(from);
         let fits = low <= fl && high >= fh;
-        self.maybe_lossy(&a, to, fits);
+        self.maybe_lossy(&a, to, fits || a.flex);
         if matches!(a.kind, Kind::Place(_)) {
             // read as what it is: its place has another width than the type it becomes
             let local = self.value(&a);

@@ -376,6 +376,8 @@ impl<'a> Lowering<'_, 'a> {
         if !matches!(self.class(count.ty), Class::Int(_)) {
             return self.refuse(name, &count, span);
         }
+        let (flex, e) = (value.flex, shifted_as(name, &value).unwrap_or(e));
+        let value = if flex { Operand { ty: self.c.elem(e), ..value } } else { value };
         let lint = self.c.elem(Elem::Lint);
         let width = self.constant(Value::Int((takt_ir::elem_size(e) * 8).into()), lint, span);
         let ty = value.ty;
@@ -393,11 +395,11 @@ impl<'a> Lowering<'_, 'a> {
             _ => self.fold_or_emit(Op::Ror, &[&value, &count, &width], ty, span),
         };
         if let Kind::Const(Value::Int(v)) = result.kind {
-            return self.constant(Value::Int(crate::constant::cut(v, e)), ty, span);
+            return Operand { flex, ..self.constant(Value::Int(crate::constant::cut(v, e)), ty, span) };
         }
         let local = self.value(&result);
         let local = self.cut(local, e, span);
-        self.exact(local, ty, span)
+        Operand { flex, ..self.exact(local, ty, span) }
     }
 
     fn trunc(&mut self, name: &str, a: Operand, span: Span) -> Operand {
@@ -603,6 +605,20 @@ fn counts(name: &str) -> (usize, usize) {
         "SHL" | "SHR" | "ROL" | "ROR" | "ATAN2" | "EXPT" => (2, 2),
         _ if OPERATOR_FUNCTIONS.iter().any(|(n, _)| *n == name) => (2, 2),
         _ => (1, 1),
+    }
+}
+
+/// The type that a literal is shifted as: in 64 bits, so that `SHL(1, 20)` is what it looks like; rotated, the smallest bit string that holds it.
+fn shifted_as(name: &str, value: &Operand) -> Option<Elem> {
+    let Kind::Const(Value::Int(v)) = value.kind else { return None };
+    let rotated = matches!(name, "ROL" | "ROR");
+    match v {
+        _ if !value.flex => None,
+        ..0 => Some(Elem::Lint),
+        0..=0xFF if rotated => Some(Elem::Byte),
+        0x100..=0xFFFF if rotated => Some(Elem::Word),
+        0x1_0000..=0xFFFF_FFFF if rotated => Some(Elem::Dword),
+        _ => Some(Elem::Lword),
     }
 }
 

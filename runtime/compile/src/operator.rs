@@ -258,7 +258,7 @@ impl<'a> Lowering<'_, 'a> {
     fn int_binary(&mut self, op: BinaryOp, (a, x): (Operand, Elem), (b, y): (Operand, Elem), span: Span) -> Operand {
         let fits = |operand: &Operand, e: Elem| match operand.kind {
             Kind::Const(Value::Int(v)) if operand.flex => (range(e).0..=range(e).1).contains(&v),
-            _ => false,
+            _ => shifted(operand),
         };
         let (e, ty) = match (a.flex, b.flex) {
             (false, true) if fits(&b, x) => (x, a.ty),
@@ -285,13 +285,13 @@ impl<'a> Lowering<'_, 'a> {
         let comparison = is_comparison(op);
         let result_type = if comparison { self.bool_type() } else { ty };
         let result = self.fold_or_emit(int_op(op, e), &[&a, &b], result_type, span);
+        let flex = a.flex && b.flex;
         match op {
             _ if comparison => Operand { exact: true, ..result },
-            BinaryOp::And | BinaryOp::Or | BinaryOp::Xor => {
-                let flex = a.flex && b.flex && matches!(result.kind, Kind::Const(_));
+            BinaryOp::And | BinaryOp::Or | BinaryOp::Xor if !shifted(&a) && !shifted(&b) => {
                 Operand { exact: a.exact && b.exact, flex, ..result }
             }
-            _ => self.computed(result),
+            _ => Operand { flex, ..self.computed(result) },
         }
     }
 
@@ -513,7 +513,12 @@ pub(crate) fn int_op(op: BinaryOp, e: Elem) -> Op {
     }
 }
 
-/// What arithmetic and comparisons of two literals come to, without a limit of width; `None` for the others.
+/// Whether this is a literal shifted by a variable: its value may exceed any type it is needed in.
+fn shifted(operand: &Operand) -> bool {
+    operand.flex && !matches!(operand.kind, Kind::Const(_))
+}
+
+/// What arithmetic of two literals come to, without a limit of width; `None` for the others.
 fn of_literals(op: BinaryOp, x: i128, y: i128) -> Option<i128> {
     match op {
         BinaryOp::Add => Some(x + y),
