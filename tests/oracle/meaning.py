@@ -303,7 +303,9 @@ class Language:
         return "LTIME" if a.type in TIMES else common(a.type, b.type)
 
     def as_type(self, a, to):
-        """An implicit conversion between operands."""
+        """An implicit conversion between operands: what is computed in 64 bits stays so."""
+        if a.type == to:
+            return a
         if a.type in REALS or to in REALS or a.type in TIMES:
             return self.convert(a, to)
         return Value(to, a.data)
@@ -324,11 +326,15 @@ class Language:
         number = number_of(k.type, k.data)
         return choices[number if 0 <= number < len(choices) else -1]
 
+    def passed(self, a, to):
+        """Given to a function's input."""
+        return load(to, self.assign(a, to))
+
     # Times.
 
     def span_arithmetic(self, sign, a, b):
         to = a.type if a.type == b.type else "LTIME"
-        a, b = self.convert(a, to), self.convert(b, to)
+        a, b = self.as_type(a, to), self.as_type(b, to)
         return self.result("LINT" if sign == "/" else to, self.registers(sign, a, b, False))
 
     def scaled(self, sign, a, b):
@@ -346,5 +352,5 @@ class Language:
 
     def moved(self, sign, a, b):
         """A date and a duration."""
-        steps = truncated(number_of(b.type, b.data) * TIMES[b.type][2], TIMES[a.type][2])
+        steps = truncated(as_signed(b.data) * TIMES[b.type][2], TIMES[a.type][2])
         return self.result(a.type, a.data + (steps if sign == "+" else -steps))

@@ -6,17 +6,20 @@ The first lines name lists of operand bits: `values TYPE LIST bits…` (hexadeci
 
     ARITHMETIC TARGET | OPERANDS … | TEMPLATE | CELLS
 
-with operands `TYPE.LIST` for `{a}`, `{b}`, `{c}`; several groups of operands stand beside each other where their cells are equal. The cells follow
-the operands' lists, the last one fastest: bits of the target in hexadecimal, `!` for a division by zero, `?` where the table does not say. Cells of
-a BOOL stand without spaces. `implicit SOURCE TARGET.` says what the compiler says of an assignment: nothing (`.`), a warning (`w`), an error (`e`).
+where ARITHMETIC is `codesys`, `iec` or `both`, with operands `TYPE.LIST` for `{a}`, `{b}`, `{c}`; several groups of operands stand beside each
+other where their cells are equal. The cells follow the operands' lists, the last one fastest: bits of the target in hexadecimal, `!` for a division
+by zero, `?` where the table does not say. Cells of a BOOL stand without spaces.
+
+`implicit SOURCE TARGET.` says what the compiler says of an assignment: nothing (`.`), a warning (`w`), an error (`e`).
 """
 
 import itertools
 import sys
 from fractions import Fraction
 
+import expressions
 import rational
-from meaning import (CLOCKS, DATES, DAY, DURATIONS, ELEMENTARY, INTEGERS, REALS, TIMES, Fault, Language, Unknown, Value, implicit,
+from meaning import (CLOCKS, DATES, DAY, DURATIONS, ELEMENTARY, INTEGERS, REALS, TIMES, Fault, Language, Unknown, Value, common, implicit,
                      integer_range, literal, load, shape, to_integer, width)
 
 COMPARISONS = ["=", "<>", "<", "<=", ">", ">="]
@@ -27,7 +30,7 @@ def integer_edges(name, which):
     bits = width(name)
     small = [low, -1, 0, 1, 7, high] if low < 0 else [0, 1, 7, 1 << bits - 1, high - 1, high]
     if which == "few":
-        return small if low < 0 else [0, 1, high]
+        return [low, -1, 1, high] if low < 0 else [0, 1, high]
     if which == "small":
         return small
     powers = [(1 << k) + d for k in (7, 8, 15, 16, 24, 31, 32, 53, 63) for d in (-1, 0, 1)]
@@ -43,7 +46,7 @@ def real_edges(name, which):
     small = [rational.NAN, ("inf", 1), ("inf", 0), rational.number(0), rational.number(0, 1), rational.number(1), rational.number(Fraction(-5, 2)),
              tiny, largest, rational.number((1 << 24) + 1)]
     if which == "few":
-        return small[:6]
+        return [rational.NAN, rational.number(0, 1), rational.number(1), rational.number(Fraction(-5, 2)), rational.number(70000)]
     if which == "small":
         return small
     wide = [(1 << k) + d for k in (7, 8, 15, 16, 24, 31, 32, 53, 63, 64) for d in (Fraction(-1), Fraction(-1, 2), 0, Fraction(1, 2), 1)]
@@ -59,6 +62,8 @@ def time_edges(name, which):
     small = [0, 1, 3 * second // 2, day + 7 * second, high]
     if sign:
         small += [-1, -3 * second // 2, -(1 << 63)]
+    if which == "few":
+        return [1, 3 * second // 2, -3 * second // 2 if sign else high]
     if which != "full":
         return small
     more = [second, second - 1, 1000, 999, 499, 500, day, day - 1, day + 1, 365 * day + 12345 * second, 1 << 31, high - 1]
@@ -77,6 +82,8 @@ def edges(name, which):
         return [n & ((1 << width(name)) - 1) for n in numbers]
     if name == "BOOL":
         return [0, 1]
+    if which == "one":
+        return [1]
     if name in REALS:
         found = [rational.encode(v, REALS[name]) for v in real_edges(name, which)]
     else:
@@ -107,14 +114,15 @@ class Table:
     def add(self, arithmetic, template, meaning, operands, targets):
         """A line per target and arithmetic (`codesys`, `iec`)."""
         keys = [self.operand(*o) for o in operands]
-        for name, target in itertools.product(arithmetic, targets):
-            language = Language(name == "iec")
-            rows = itertools.product(*(self.lists[k] for k in keys))
-            cells = [self.cell(language, meaning, [load(o[0], b) for o, b in zip(operands, row)], target) for row in rows]
-            if "?" in cells and set(cells) == {"?"}:
-                continue
-            joined = "".join(cells) if target == "BOOL" else " ".join(cells)
-            self.lines.setdefault((name, target, template, joined), []).append(",".join(keys))
+        rows = [[load(o[0], b) for o, b in zip(operands, row)] for row in itertools.product(*(self.lists[k] for k in keys))]
+        for target in targets:
+            found = {name: [self.cell(Language(name == "iec"), meaning, row, target) for row in rows] for name in arithmetic}
+            if len(found) == 2 and found["codesys"] == found["iec"]:
+                found = {"both": found["iec"]}
+            for name, cells in found.items():
+                if set(cells) != {"?"}:
+                    joined = "".join(cells) if target == "BOOL" else " ".join(cells)
+                    self.lines.setdefault((name, target, template, joined), []).append(",".join(keys))
 
     def implicit(self, source, target):
         self.verdicts.append((source, target, implicit(source, target)))
@@ -143,6 +151,8 @@ def integers(table):
             table.add(BOTH, f"{{a}} {sign} {{b}}", meaning, pair, ["LINT"])
             table.add(CODESYS, f"{{a}} {sign} {{b}}", meaning, pair, [NARROW[i % 6]])
         table.add(CODESYS, "{a} + {b}", lambda m, x, y: m.arithmetic("+", x, y), pair, ["LREAL"])
+        own = common(a, b)
+        table.add(CODESYS, f"TO_{own}({{a}} + {{b}})", lambda m, x, y: m.convert(m.arithmetic("+", x, y), own), pair, ["LINT"])
         table.add(BOTH, "({a} + {b}) / 3", lambda m, x, y: m.arithmetic("/", m.arithmetic("+", x, y), load("SINT", 3)), pair, ["LINT"])
         table.add(BOTH, "{a} - {b} < {a}", lambda m, x, y: m.compare("<", m.arithmetic("-", x, y), x), pair, ["BOOL"])
         for sign in COMPARISONS:
@@ -268,7 +278,7 @@ def conversions(table):
     for a, b in itertools.product(ELEMENTARY, repeat=2):
         if a != b:
             table.add(CODESYS, f"{a}_TO_{b}({{a}})", lambda m, x: m.convert(x, b), [(a, "full")], [b])
-            table.add(CODESYS, f"TO_{b}({{a}})", lambda m, x: m.convert(x, b), [(a, "few" if a not in TIMES else "small")], [b])
+            table.add(CODESYS, f"TO_{b}({{a}})", lambda m, x: m.convert(x, b), [(a, "few")], [b])
             table.implicit(a, b)
     numbers = [*INTEGERS, *REALS]
     for a, b in [*itertools.product(numbers, repeat=2), *itertools.product(DURATIONS, repeat=2)]:
@@ -277,7 +287,7 @@ def conversions(table):
 
 def main():
     table = Table()
-    for part in (integers, single_integers, reals, booleans, times, literals, conversions):
+    for part in (integers, single_integers, reals, booleans, times, literals, expressions.fill, conversions):
         part(table)
     sys.stdout.write("# Written by tests/oracle/table.py, which says what it means.\n")
     table.write(sys.stdout)

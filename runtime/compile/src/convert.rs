@@ -10,8 +10,11 @@ use takt_syntax::Code;
 impl Lowering<'_, '_> {
     /// Converts implicitly to the type of a place: silent without loss, a warning with, an error where there is no such conversion.
     pub(crate) fn convert(&mut self, a: Operand, to: TypeId) -> Operand {
-        if a.is_error() || a.ty == to && !matches!(a.kind, Kind::Void) {
+        if a.is_error() {
             return a;
+        }
+        if a.ty == to && !matches!(a.kind, Kind::Void) {
+            return self.folded(a);
         }
         if *self.c.types.get(to) == Type::Error {
             return self.error(a.span);
@@ -51,6 +54,29 @@ impl Lowering<'_, '_> {
             (Class::Moment(x), Class::Moment(y)) if x == y => Operand { ty: to, ..a },
             _ => self.mismatch(a, to),
         }
+    }
+
+    /// As [`Lowering::convert`], for an operand beside others: what is computed in 64 bits stays so, folded or not.
+    pub(crate) fn convert_operand(&mut self, a: Operand, to: TypeId) -> Operand {
+        match (&a.kind, self.class(a.ty), self.class(to)) {
+            _ if a.ty == to => a,
+            (Kind::Const(Value::Int(v)), Class::Int(_), Class::Int(into)) if !a.flex && !(range(into).0..=range(into).1).contains(v) => {
+                Operand { ty: to, exact: false, ..a }
+            }
+            _ => self.convert(a, to),
+        }
+    }
+
+    /// A constant that was computed beyond its own type, cut to it.
+    fn folded(&mut self, a: Operand) -> Operand {
+        let (Kind::Const(Value::Int(v)), Some(e)) = (&a.kind, self.scalar(a.ty)) else { return a };
+        let (v, (low, high)) = (*v, range(e));
+        if (low..=high).contains(&v) {
+            return a;
+        }
+        let name = self.type_name(a.ty);
+        self.report(Code::ConstantOverflow, a.span, format!("{v} does not fit `{name}` and is cut to {}", cut(v, e)));
+        self.constant(Value::Int(cut(v, e)), a.ty, a.span)
     }
 
     fn mismatch(&mut self, a: Operand, to: TypeId) -> Operand {

@@ -278,7 +278,7 @@ impl<'a> Lowering<'_, 'a> {
         let flex = operands.iter().all(|o| o.flex);
         let mut best: Option<Operand> = None;
         for operand in operands {
-            let operand = self.convert(operand, ty);
+            let operand = self.convert_operand(operand, ty);
             best = Some(match best {
                 None => operand,
                 Some(best) => {
@@ -318,7 +318,7 @@ impl<'a> Lowering<'_, 'a> {
             let zero = self.b.int(0);
             return self.pick(&[(cond, operands[1].clone()), (zero, operands[0].clone())], &operands[0].clone(), ty, span);
         }
-        let mut converted: Vec<Operand> = operands.into_iter().map(|o| self.convert(o, ty)).collect();
+        let mut converted: Vec<Operand> = operands.into_iter().map(|o| self.convert_operand(o, ty)).collect();
         let (no, yes) = (converted.remove(0), converted.remove(0));
         self.choose(selector, yes, no, ty, span)
     }
@@ -340,9 +340,9 @@ impl<'a> Lowering<'_, 'a> {
             return self.pick(&choices, &last, ty, span);
         }
         let bool_type = self.bool_type();
-        let mut result = self.convert(last, ty);
+        let mut result = self.convert_operand(last, ty);
         for (cond, operand) in choices.into_iter().rev() {
-            let operand = self.convert(operand, ty);
+            let operand = self.convert_operand(operand, ty);
             let cond = self.exact(cond, bool_type, span);
             result = self.choose(cond, operand, result, ty, span);
         }
@@ -455,7 +455,8 @@ impl<'a> Lowering<'_, 'a> {
             (Class::Other, _) => self.refuse("a conversion", &a, span),
             (_, Target::Elem(e)) => {
                 let ty = self.c.elem(e);
-                let result = self.explicit(Operand { flex: false, ..a }, ty);
+                let a = self.own_range(Operand { flex: false, ..a });
+                let result = self.explicit(a, ty);
                 Operand { flex: false, ty, ..result }
             }
             (_, Target::Text) => self.text_of(a, span),

@@ -1,7 +1,7 @@
 //! Rows of the table with operands in constants: what is folded must be what is computed.
 
 use crate::table::{Cell, Line, Table, Unit, filled};
-use crate::variables::{Array, START, describe, program};
+use crate::variables::{Array, START, describe, passing, program};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use takt_compile::Options;
@@ -80,7 +80,8 @@ pub fn run(table: &Table, units: &[&Unit<'_>]) -> (usize, Vec<String>) {
         let _ = writeln!(globals, "  r{n} : ARRAY[0..0] OF {};", row.line.target);
         let _ = writeln!(body, "r{n}[0] := {};", row.expression);
     }
-    let source = format!("{}VAR_GLOBAL\n{globals}END_VAR\nPROGRAM main\n{body}END_PROGRAM\n", constants(table, units));
+    let head = passing(units) + &constants(table, units);
+    let source = format!("{head}VAR_GLOBAL\n{globals}END_VAR\nPROGRAM main\n{body}END_PROGRAM\n");
     let program = match program(&source, units[0].iec) {
         Ok(program) => program,
         Err(wrong) => return (rows.len(), wrong),
@@ -102,9 +103,9 @@ pub fn run(table: &Table, units: &[&Unit<'_>]) -> (usize, Vec<String>) {
 
 /// Divisions by a constant zero are reported, each where it is.
 pub fn refused(table: &Table, units: &[&Unit<'_>]) -> Vec<String> {
-    let rows = rows(table, units, |c| c == Cell::Fault, 1);
-    let head = constants(table, units);
-    let mut source = head;
+    let mut rows = rows(table, units, |c| c == Cell::Fault, 1);
+    rows.retain(|row| !row.expression.contains("pass_"));
+    let mut source = constants(table, units);
     let _ = write!(source, "PROGRAM main VAR");
     for (n, row) in rows.iter().enumerate() {
         let _ = write!(source, " r{n} : {};", row.line.target);

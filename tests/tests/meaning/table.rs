@@ -23,7 +23,7 @@ pub struct List {
 }
 
 /// An expression over lists of operands; the last list runs fastest.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Line {
     /// Type that the expression is assigned to.
     pub target: String,
@@ -91,8 +91,13 @@ impl Table {
         } else {
             cells.split(' ').map(cell).collect()
         };
-        let groups = groups.split(' ').map(|g| g.split(',').map(String::from).collect()).collect();
-        self.lines.push((arithmetic == "iec", groups, Line { target: target.into(), template: template.into(), cells }));
+        let groups: Vec<Vec<String>> = groups.split(' ').map(|g| g.split(',').map(String::from).collect()).collect();
+        let line = Line { target: target.into(), template: template.into(), cells };
+        for iec in [false, true] {
+            if arithmetic == "both" || (arithmetic == "iec") == iec {
+                self.lines.push((iec, groups.clone(), line.clone()));
+            }
+        }
     }
 
     /// The lines by operands, in the order of the file.

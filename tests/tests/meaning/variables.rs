@@ -11,6 +11,8 @@ use takt_tests::trial::{Start, compiled, interpreted};
 /// More than any of these programs needs.
 pub const START: Start = Start { scans: 1, fuel: 1 << 40, slow_polls: 0, flag: 0, depth_limit: 100, stack: 1 << 20 };
 
+const INTEGERS: [&str; 12] = ["BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"];
+
 const LETTERS: [&str; 3] = ["a", "b", "c"];
 
 /// A program that computes all rows of the units.
@@ -31,7 +33,14 @@ pub fn source(table: &Table, units: &[&Unit<'_>]) -> String {
         functions.push_str(&function(table, n, unit));
         let _ = writeln!(calls, "u{n}();");
     }
-    format!("VAR_GLOBAL\n{globals}END_VAR\n{functions}PROGRAM main\n{calls}END_PROGRAM\n")
+    format!("{}VAR_GLOBAL\n{globals}END_VAR\n{functions}PROGRAM main\n{calls}END_PROGRAM\n", passing(units))
+}
+
+/// The functions `pass_INT`, … that the units call: they give back what is passed to them.
+pub fn passing(units: &[&Unit<'_>]) -> String {
+    let used = |ty: &&&str| units.iter().flat_map(|u| &u.lines).any(|l| l.template.contains(&format!("pass_{ty}(")));
+    let function = |ty: &&str| format!("FUNCTION pass_{ty} : {ty} VAR_INPUT x : {ty}; END_VAR\npass_{ty} := x;\nEND_FUNCTION\n");
+    INTEGERS.iter().filter(used).map(function).collect()
 }
 
 /// Loops over the operands of a unit; each line is computed from locals and from elements of arrays.
@@ -171,8 +180,9 @@ pub fn faults(table: &Table, units: &[&Unit<'_>]) -> (usize, Vec<String>) {
     if rows.is_empty() {
         return (0, Vec::new());
     }
+    let functions = passing(units);
     let source = format!(
-        "VAR_GLOBAL\n  which : ARRAY[0..0] OF DINT;\n{globals}END_VAR\nPROGRAM main\nCASE which[0] OF\n{arms}END_CASE\nEND_PROGRAM\n"
+        "{functions}VAR_GLOBAL\n  which : ARRAY[0..0] OF DINT;\n{globals}END_VAR\nPROGRAM main\nCASE which[0] OF\n{arms}END_CASE\nEND_PROGRAM\n"
     );
     let mut program = match program(&source, units[0].iec) {
         Ok(program) => program,
