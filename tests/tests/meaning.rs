@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use table::{Table, Unit};
 use takt_compile::Options;
 use takt_tests::bench;
+use takt_tests::case::Case;
 
 /// Units of one program.
 const BATCH: usize = 24;
@@ -45,7 +46,9 @@ fn in_batches(work: impl Fn(&Table, &[&Unit<'_>]) -> (usize, Vec<String>) + Sync
         threads.into_iter().flat_map(|t| t.join().expect("a finding is no panic")).collect()
     });
     assert!(wrong.is_empty(), "{} rows differ:\n{}", wrong.len(), wrong[..wrong.len().min(40)].join("\n"));
-    count.into_inner()
+    let count = count.into_inner();
+    println!("{count} rows");
+    count
 }
 
 #[test]
@@ -106,5 +109,19 @@ fn implicit_conversions_are_silent_warned_of_or_refused() {
             })
             .collect();
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+}
+
+/// The page of decisions is true: each of its snippets runs and leaves what it says.
+#[test]
+fn the_page_says_what_is_so() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/meaning.md");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let snippets: Vec<&str> = text.split("```iecst\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(snippets.len() >= 6, "{} snippets", snippets.len());
+    for (n, snippet) in snippets.iter().enumerate() {
+        assert!(snippet.contains("//| "), "snippet {n} says nothing");
+        let case = Case { name: format!("snippet {n}"), kind: "run".into(), source: (*snippet).into(), line: 1 };
+        bench::run_case(&case).unwrap_or_else(|e| panic!("snippet {n}: {e}\n{snippet}"));
     }
 }

@@ -51,6 +51,7 @@ impl Lowering<'_, '_> {
             }
             (Class::Char(x), Class::Char(y)) if x == y => Operand { ty: to, ..a },
             (Class::Bool, Class::Bool) => Operand { ty: to, ..a },
+            (Class::Int(_), Class::Bool) if a.is_bit() => Operand { ty: to, flex: false, ..a },
             (Class::Moment(x), Class::Moment(y)) if x == y => Operand { ty: to, ..a },
             _ => self.mismatch(a, to),
         }

@@ -205,12 +205,21 @@ impl<'a> Lowering<'_, 'a> {
 
     /// The operand if it is BOOL; else reported.
     pub(crate) fn condition_operand(&mut self, operand: Operand) -> Operand {
+        let operand = self.truth(operand);
         if operand.is_error() || self.class(operand.ty) == Class::Bool && !matches!(operand.kind, Kind::Void) {
             return operand;
         }
         let (name, span) = (self.operand_name(&operand), operand.span);
         self.report(Code::TypeMismatch, span, format!("expected `BOOL`, found {name}"));
         self.error(span)
+    }
+
+    /// The literals 0 and 1 are FALSE and TRUE where a BOOL is needed.
+    fn truth(&mut self, operand: Operand) -> Operand {
+        if !operand.is_bit() {
+            return operand;
+        }
+        Operand { ty: self.bool_type(), flex: false, ..operand }
     }
 
     /// The operand's type for messages.
@@ -226,6 +235,11 @@ impl<'a> Lowering<'_, 'a> {
             return self.error(span);
         }
         use BinaryOp::*;
+        let (a, b) = match (self.class(a.ty), self.class(b.ty)) {
+            (Class::Bool, Class::Int(_)) => (a, self.truth(b)),
+            (Class::Int(_), Class::Bool) => (self.truth(a), b),
+            _ => (a, b),
+        };
         let (ca, cb) = (self.class(a.ty), self.class(b.ty));
         match (op, ca, cb) {
             (And | Or | Xor | Eq | Ne | Lt | Le | Gt | Ge, Class::Bool, Class::Bool) => {
@@ -407,10 +421,11 @@ impl<'a> Lowering<'_, 'a> {
             }
             (Add | Sub, Class::Moment(x), Class::Duration(y)) => {
                 let (unit, duration) = moment_unit(x);
-                if y != duration {
+                if y == Elem::Ltime && duration == Elem::Time {
                     return self.bad_operands(op, &a, &b, span);
                 }
-                let ty = a.ty;
+                let (ty, span_type) = (a.ty, self.c.elem(duration));
+                let b = self.explicit(b, span_type);
                 let steps = self.scale(b, Op::Div, unit, ty, span);
                 let result = self.fold_or_emit(if op == Add { Op::Add } else { Op::Sub }, &[&a, &steps], ty, span);
                 self.computed(result)
