@@ -6,7 +6,7 @@ from fractions import Fraction
 import rational
 from meaning import DURATIONS, INTEGERS, REALS, Value, literal
 
-COUNT = 500
+COUNT = 560
 BOTH = ("codesys", "iec")
 
 

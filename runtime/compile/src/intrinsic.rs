@@ -381,11 +381,7 @@ impl<'a> Lowering<'_, 'a> {
         let lint = self.c.elem(Elem::Lint);
         let width = self.constant(Value::Int((takt_ir::elem_size(e) * 8).into()), lint, span);
         let ty = value.ty;
-        let local = self.exact_value(&value);
-        let value = match value.kind {
-            Kind::Const(_) => value,
-            _ => self.exact(local, ty, span),
-        };
+        let value = self.own_range(value);
         let signed = matches!(e, Elem::Sint | Elem::Int | Elem::Dint | Elem::Lint);
         let result = match name {
             "SHL" => self.fold_or_emit(Op::Shl, &[&value, &count], ty, span),
