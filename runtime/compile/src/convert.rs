@@ -10,8 +10,11 @@ use takt_syntax::Code;
 impl Lowering<'_, '_> {
     /// Converts implicitly to the type of a place: silent without loss, a warning with, an error where there is no such conversion.
     pub(crate) fn convert(&mut self, a: Operand, to: TypeId) -> Operand {
-        if a.is_error() || a.ty == to && !matches!(a.kind, Kind::Void) {
+        if a.is_error() {
             return a;
+        }
+        if a.ty == to && !matches!(a.kind, Kind::Void) {
+            return self.folded(a);
         }
         if *self.c.types.get(to) == Type::Error {
             return self.error(a.span);
@@ -51,9 +54,33 @@ impl Lowering<'_, '_> {
             }
             (Class::Char(x), Class::Char(y)) if x == y => Operand { ty: to, ..a },
             (Class::Bool, Class::Bool) => Operand { ty: to, ..a },
+            (Class::Int(_), Class::Bool) if a.is_bit() => Operand { ty: to, flex: false, ..a },
             (Class::Moment(x), Class::Moment(y)) if x == y => Operand { ty: to, ..a },
             _ => self.mismatch(a, to),
         }
+    }
+
+    /// As [`Lowering::convert`], for an operand beside others: what is computed in 64 bits stays so, folded or not.
+    pub(crate) fn convert_operand(&mut self, a: Operand, to: TypeId) -> Operand {
+        match (&a.kind, self.class(a.ty), self.class(to)) {
+            _ if a.ty == to => a,
+            (Kind::Const(Value::Int(v)), Class::Int(_), Class::Int(into)) if !a.flex && !(range(into).0..=range(into).1).contains(v) => {
+                Operand { ty: to, exact: false, ..a }
+            }
+            _ => self.convert(a, to),
+        }
+    }
+
+    /// A constant that was computed beyond its own type, cut to it.
+    fn folded(&mut self, a: Operand) -> Operand {
+        let (Kind::Const(Value::Int(v)), Some(e)) = (&a.kind, self.scalar(a.ty)) else { return a };
+        let (v, (low, high)) = (*v, range(e));
+        if (low..=high).contains(&v) {
+            return a;
+        }
+        let name = self.type_name(a.ty);
+        self.report(Code::ConstantOverflow, a.span, format!("{v} does not fit `{name}` and is cut to {}", cut(v, e)));
+        self.constant(Value::Int(cut(v, e)), a.ty, a.span)
     }
 
     fn mismatch(&mut self, a: Operand, to: TypeId) -> Operand {
@@ -96,7 +123,7 @@ impl Lowering<'_, '_> {
         }
         let (fl, fh) = range(from);
         let fits = low <= fl && high >= fh;
-        self.maybe_lossy(&a, to, fits);
+        self.maybe_lossy(&a, to, fits || a.flex);
         if matches!(a.kind, Kind::Place(_)) {
             // read as what it is: its place has another width than the type it becomes
             let local = self.value(&a);
@@ -120,6 +147,13 @@ impl Lowering<'_, '_> {
                 let op = if into == Elem::Lreal { Op::F32ToF64 } else { Op::F64ToF32 };
                 self.real_to_real(op, a, to)
             }
+            (true, false) if into == Elem::Bool => {
+                let ty = self.c.elem(from);
+                let zero = self.constant(Value::Real(0.0), ty, span);
+                let op = if from == Elem::Real { Op::NeF32 } else { Op::NeF64 };
+                let result = self.fold_or_emit(op, &[&a, &zero], to, span);
+                Operand { exact: true, ..result }
+            }
             (true, false) => {
                 let op = if from == Elem::Real { Op::RoundF32 } else { Op::RoundF64 };
                 let whole = self.fold_or_emit(op, &[&a], to, span);
@@ -127,6 +161,10 @@ impl Lowering<'_, '_> {
             }
             (false, true) => {
                 let a = self.own_range(a);
+                if let Kind::Const(Value::Int(v)) = a.kind {
+                    let v = if into == Elem::Real { f64::from(v as f32) } else { v as f64 };
+                    return self.constant(Value::Real(v), to, span);
+                }
                 let op = match (is_unsigned_64(from), into == Elem::Real) {
                     (false, false) => Op::I64ToF64,
                     (false, true) => Op::I64ToF32,
@@ -154,8 +192,12 @@ impl Lowering<'_, '_> {
     }
 
     /// The operand within the range of its own type.
-    fn own_range(&mut self, a: Operand) -> Operand {
+    pub(crate) fn own_range(&mut self, a: Operand) -> Operand {
         match (&a.kind, a.exact) {
+            (Kind::Const(Value::Int(v)), _) => match self.scalar(a.ty) {
+                Some(e) if !a.flex => self.constant(Value::Int(cut(*v, e)), a.ty, a.span),
+                _ => a,
+            },
             (Kind::Const(_), _) | (_, true) => a,
             _ => {
                 let local = self.exact_value(&a);
@@ -181,32 +223,45 @@ impl Lowering<'_, '_> {
         self.exact(local, to, span)
     }
 
-    /// Units change between TIME and LTIME and between kinds of dates; numbers stay.
+    /// Between times and dates what is meant stays: units change, DATE and LDATE are cut to the beginning of the day, TOD and LTOD of a date are
+    /// what is left of the day. All else keeps its number.
     fn between_times(&mut self, a: Operand, from: Elem, into: Elem, to: TypeId) -> Operand {
-        use Elem::*;
-        const DAY: i64 = 86_400;
-        let steps: &[(Op, i64)] = match (from, into) {
-            (Time, Ltime) | (Tod, Ltod) => &[(Op::Mul, 1_000_000)],
-            (Ltime, Time) => &[(Op::Div, 1_000_000)],
-            (Ltod, Tod) => &[(Op::DivU, 1_000_000)],
-            (Dt, Ldate) => &[(Op::Div, DAY), (Op::Mul, DAY * 1_000_000_000)],
-            (Dt | Date, Ldt | Ldate) => &[(Op::Mul, 1_000_000_000)],
-            (Ldt | Ldate, Dt) | (Ldate, Date) => &[(Op::DivU, 1_000_000_000)],
-            (Ldt, Date) => &[(Op::DivU, DAY * 1_000_000_000), (Op::Mul, DAY)],
-            (Dt, Date) => &[(Op::Div, DAY), (Op::Mul, DAY)],
-            (Dt, Tod) => &[(Op::Rem, DAY), (Op::Mul, 1000)],
-            (Ldt, Ldate) => &[(Op::DivU, DAY * 1_000_000_000), (Op::Mul, DAY * 1_000_000_000)],
-            (Ldt, Ltod) => &[(Op::RemU, DAY * 1_000_000_000)],
-            _ => return a,
-        };
-        let lint = self.c.elem(Lint);
+        let (Some(unit), Some(target)) = (nanoseconds(from), nanoseconds(into)) else { return a };
+        let unsigned = is_unsigned_64(from);
+        let div = if unsigned { Op::DivU } else { Op::Div };
+        let (is_day, is_clock) = (|e| matches!(e, Elem::Date | Elem::Ldate), |e| matches!(e, Elem::Tod | Elem::Ltod));
+        let is_date = |e| is_day(e) || matches!(e, Elem::Dt | Elem::Ldt);
         let mut a = a;
-        for (op, unit) in steps {
-            let span = a.span;
-            let unit = self.constant(Value::Int((*unit).into()), lint, span);
-            a = Operand { exact: false, ..self.fold_or_emit(*op, &[&a, &unit], to, span) };
+        if is_day(into) && !is_day(from) {
+            a = self.step(a, div, DAY / unit, to);
+            return self.step(a, Op::Mul, DAY / target, to);
         }
-        a
+        if is_clock(into) && is_date(from) {
+            a = self.step(a, if unsigned { Op::RemU } else { Op::Rem }, DAY / unit, to);
+        }
+        if unit > target { self.step(a, Op::Mul, unit / target, to) } else { self.step(a, div, target / unit, to) }
+    }
+
+    fn step(&mut self, a: Operand, op: Op, by: i64, to: TypeId) -> Operand {
+        if by == 1 {
+            return a;
+        }
+        let (lint, span) = (self.c.elem(Elem::Lint), a.span);
+        let by = self.constant(Value::Int(by.into()), lint, span);
+        Operand { exact: false, ..self.fold_or_emit(op, &[&a, &by], to, span) }
+    }
+}
+
+/// Nanoseconds of a day.
+const DAY: i64 = 86_400_000_000_000;
+
+/// Nanoseconds that the unit of a time or date has.
+fn nanoseconds(e: Elem) -> Option<i64> {
+    match e {
+        Elem::Time | Elem::Tod => Some(1_000_000),
+        Elem::Date | Elem::Dt => Some(1_000_000_000),
+        Elem::Ltime | Elem::Ltod | Elem::Ldate | Elem::Ldt => Some(1),
+        _ => None,
     }
 }
 

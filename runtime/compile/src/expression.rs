@@ -49,6 +49,10 @@ impl Operand {
     pub(crate) fn is_error(&self) -> bool {
         matches!(self.kind, Kind::Error)
     }
+    /// Whether this is the literal 0 or 1.
+    pub(crate) fn is_bit(&self) -> bool {
+        self.flex && matches!(self.kind, Kind::Const(Value::Int(0 | 1)))
+    }
 }
 
 /// Why an output is not written from outside.

@@ -2,7 +2,7 @@
 
 use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand, Thing};
-use crate::operator::{Class, common_int};
+use crate::operator::{Class, common_int, is_unsigned_64};
 use crate::scope::{Item, key};
 use crate::types::elementary;
 use takt_abi::Elem;
@@ -33,7 +33,6 @@ const OPERATOR_FUNCTIONS: &[(&str, BinaryOp)] = &[
     ("MUL", BinaryOp::Mul),
     ("DIV", BinaryOp::Div),
     ("MOD", BinaryOp::Mod),
-    ("EXPT", BinaryOp::Power),
     ("AND", BinaryOp::And),
     ("OR", BinaryOp::Or),
     ("XOR", BinaryOp::Xor),
@@ -81,6 +80,7 @@ impl<'a> Lowering<'_, 'a> {
     fn is_intrinsic(&self, name: &str) -> bool {
         const OTHERS: &[&str] = &[
             "ABS",
+            "EXPT",
             "MIN",
             "MAX",
             "LIMIT",
@@ -153,6 +153,10 @@ impl<'a> Lowering<'_, 'a> {
             return rest.fold(first, |a, b| self.binary(*op, a, b, span));
         }
         match name {
+            "EXPT" => {
+                let exponent = operands.remove(1);
+                self.expt(operands.remove(0), exponent, span)
+            }
             "ABS" => self.abs(operands.remove(0), span),
             "NOT" => self.unary(UnaryOp::Not, operands.remove(0), span),
             "MOVE" => operands.remove(0),
@@ -212,11 +216,12 @@ impl<'a> Lowering<'_, 'a> {
 
     fn abs(&mut self, a: Operand, span: Span) -> Operand {
         match self.class(a.ty) {
+            Class::Int(e) if is_unsigned_64(e) => a,
             Class::Int(_) => {
-                let ty = a.ty;
                 let flex = a.flex;
-                let result = self.fold_or_emit(Op::Abs, &[&a], ty, span);
-                Operand { exact: false, flex, ..result }
+                let result = self.fold_or_emit(Op::Abs, &[&a], a.ty, span);
+                let result = Operand { flex, ..result };
+                self.computed(result)
             }
             Class::Real(e) => {
                 let result = self.fold_or_emit(if e == Elem::Real { Op::AbsF32 } else { Op::AbsF64 }, &[&a], a.ty, span);
@@ -236,8 +241,9 @@ impl<'a> Lowering<'_, 'a> {
                 (Class::Int(_), Class::Int(_)) if flex => operand.ty,
                 (Class::Int(_), Class::Int(_)) if operand.flex => ty,
                 (Class::Int(a), Class::Int(b)) => self.c.elem(common_int(a, b)),
-                (Class::Real(_), Class::Int(_)) => ty,
-                (Class::Int(_), Class::Real(_)) => operand.ty,
+                (Class::Real(_), Class::Int(e)) if operand.flex || takt_ir::elem_size(e) < 8 => ty,
+                (Class::Int(e), Class::Real(_)) if flex || takt_ir::elem_size(e) < 8 => operand.ty,
+                (Class::Real(_), Class::Int(_)) | (Class::Int(_), Class::Real(_)) => self.c.elem(Elem::Lreal),
                 (Class::Real(_), Class::Real(_)) if flex => operand.ty,
                 (Class::Real(_), Class::Real(_)) if operand.flex => ty,
                 (Class::Real(_), Class::Real(_)) => self.c.elem(Elem::Lreal),
@@ -272,7 +278,7 @@ impl<'a> Lowering<'_, 'a> {
         let flex = operands.iter().all(|o| o.flex);
         let mut best: Option<Operand> = None;
         for operand in operands {
-            let operand = self.convert(operand, ty);
+            let operand = self.convert_operand(operand, ty);
             best = Some(match best {
                 None => operand,
                 Some(best) => {
@@ -312,7 +318,7 @@ impl<'a> Lowering<'_, 'a> {
             let zero = self.b.int(0);
             return self.pick(&[(cond, operands[1].clone()), (zero, operands[0].clone())], &operands[0].clone(), ty, span);
         }
-        let mut converted: Vec<Operand> = operands.into_iter().map(|o| self.convert(o, ty)).collect();
+        let mut converted: Vec<Operand> = operands.into_iter().map(|o| self.convert_operand(o, ty)).collect();
         let (no, yes) = (converted.remove(0), converted.remove(0));
         self.choose(selector, yes, no, ty, span)
     }
@@ -334,9 +340,9 @@ impl<'a> Lowering<'_, 'a> {
             return self.pick(&choices, &last, ty, span);
         }
         let bool_type = self.bool_type();
-        let mut result = self.convert(last, ty);
+        let mut result = self.convert_operand(last, ty);
         for (cond, operand) in choices.into_iter().rev() {
-            let operand = self.convert(operand, ty);
+            let operand = self.convert_operand(operand, ty);
             let cond = self.exact(cond, bool_type, span);
             result = self.choose(cond, operand, result, ty, span);
         }
@@ -370,14 +376,12 @@ impl<'a> Lowering<'_, 'a> {
         if !matches!(self.class(count.ty), Class::Int(_)) {
             return self.refuse(name, &count, span);
         }
+        let (flex, e) = (value.flex, shifted_as(name, &value).unwrap_or(e));
+        let value = if flex { Operand { ty: self.c.elem(e), ..value } } else { value };
         let lint = self.c.elem(Elem::Lint);
         let width = self.constant(Value::Int((takt_ir::elem_size(e) * 8).into()), lint, span);
         let ty = value.ty;
-        let local = self.exact_value(&value);
-        let value = match value.kind {
-            Kind::Const(_) => value,
-            _ => self.exact(local, ty, span),
-        };
+        let value = self.own_range(value);
         let signed = matches!(e, Elem::Sint | Elem::Int | Elem::Dint | Elem::Lint);
         let result = match name {
             "SHL" => self.fold_or_emit(Op::Shl, &[&value, &count], ty, span),
@@ -387,11 +391,11 @@ impl<'a> Lowering<'_, 'a> {
             _ => self.fold_or_emit(Op::Ror, &[&value, &count, &width], ty, span),
         };
         if let Kind::Const(Value::Int(v)) = result.kind {
-            return self.constant(Value::Int(crate::constant::cut(v, e)), ty, span);
+            return Operand { flex, ..self.constant(Value::Int(crate::constant::cut(v, e)), ty, span) };
         }
         let local = self.value(&result);
         let local = self.cut(local, e, span);
-        self.exact(local, ty, span)
+        Operand { flex, ..self.exact(local, ty, span) }
     }
 
     fn trunc(&mut self, name: &str, a: Operand, span: Span) -> Operand {
@@ -447,7 +451,8 @@ impl<'a> Lowering<'_, 'a> {
             (Class::Other, _) => self.refuse("a conversion", &a, span),
             (_, Target::Elem(e)) => {
                 let ty = self.c.elem(e);
-                let result = self.explicit(Operand { flex: false, ..a }, ty);
+                let a = self.own_range(Operand { flex: false, ..a });
+                let result = self.explicit(a, ty);
                 Operand { flex: false, ty, ..result }
             }
             (_, Target::Text) => self.text_of(a, span),
@@ -594,9 +599,23 @@ fn counts(name: &str) -> (usize, usize) {
         "MIN" | "MAX" | "ADD" | "MUL" | "AND" | "OR" | "XOR" => (2, usize::MAX),
         "MUX" => (2, usize::MAX),
         "LIMIT" | "SEL" => (3, 3),
-        "SHL" | "SHR" | "ROL" | "ROR" | "ATAN2" => (2, 2),
+        "SHL" | "SHR" | "ROL" | "ROR" | "ATAN2" | "EXPT" => (2, 2),
         _ if OPERATOR_FUNCTIONS.iter().any(|(n, _)| *n == name) => (2, 2),
         _ => (1, 1),
+    }
+}
+
+/// The type that a literal is shifted as: in 64 bits, so that `SHL(1, 20)` is what it looks like; rotated, the smallest bit string that holds it.
+fn shifted_as(name: &str, value: &Operand) -> Option<Elem> {
+    let Kind::Const(Value::Int(v)) = value.kind else { return None };
+    let rotated = matches!(name, "ROL" | "ROR");
+    match v {
+        _ if !value.flex => None,
+        ..0 => Some(Elem::Lint),
+        0..=0xFF if rotated => Some(Elem::Byte),
+        0x100..=0xFFFF if rotated => Some(Elem::Word),
+        0x1_0000..=0xFFFF_FFFF if rotated => Some(Elem::Dword),
+        _ => Some(Elem::Lword),
     }
 }
 

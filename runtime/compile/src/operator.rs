@@ -103,14 +103,11 @@ impl<'a> Lowering<'_, 'a> {
         match (op, self.class(a.ty)) {
             (UnaryOp::Plus, Class::Int(_) | Class::Real(_) | Class::Duration(_)) => Operand { span, ..a },
             (UnaryOp::Neg, Class::Int(_) | Class::Duration(_)) => {
-                if let Kind::Const(Value::Int(v)) = a.kind {
-                    let fits = i64::try_from(-v).is_ok();
-                    let ty = if a.flex && fits { self.literal_type(-v) } else { a.ty };
-                    return Operand { flex: a.flex, ..self.constant(Value::Int(-v), ty, span) };
+                if let (Kind::Const(Value::Int(v)), true) = (&a.kind, a.flex) {
+                    return self.literal_result(-*v, span);
                 }
-                let v = self.value(&a);
-                let v = self.b.op(Op::Neg, &[v], site);
-                self.computed(v, a.ty, span)
+                let result = self.fold_or_emit(Op::Neg, &[&a], a.ty, span);
+                self.computed(result)
             }
             (UnaryOp::Neg, Class::Real(e)) => {
                 if let Kind::Const(Value::Real(v)) = a.kind {
@@ -159,14 +156,21 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     /// An integer result: cut at once in IEC arithmetic, else when it is used.
-    fn computed(&mut self, v: Local, ty: TypeId, span: Span) -> Operand {
-        match (self.c.options.iec_arithmetic, self.scalar(ty)) {
-            (true, Some(e)) => {
-                let v = self.cut(v, e, span);
-                self.exact(v, ty, span)
-            }
-            _ => self.temp(v, ty, span),
+    pub(crate) fn computed(&mut self, result: Operand) -> Operand {
+        let result = Operand { exact: false, ..result };
+        if self.c.options.iec_arithmetic { self.own_range(result) } else { result }
+    }
+
+    /// An integer computed of literals: exact, of the smallest type that holds it.
+    fn literal_result(&mut self, v: i128, span: Span) -> Operand {
+        let (low, high) = (range(Elem::Lint).0, range(Elem::Ulint).1);
+        if !(low..=high).contains(&v) {
+            self.report(Code::OutOfRange, span, format!("{v} does not fit any integer type ({low}..{high})")).help =
+                Some("write a REAL literal, `1.0`".into());
+            return self.error(span);
         }
+        let ty = self.literal_type(v);
+        Operand { flex: true, ..self.constant(Value::Int(v), ty, span) }
     }
 
     pub(crate) fn binary_expr(&mut self, op: BinaryOp, a: &'a Expr, b: &'a Expr, span: Span) -> Operand {
@@ -211,12 +215,21 @@ impl<'a> Lowering<'_, 'a> {
 
     /// The operand if it is BOOL; else reported.
     pub(crate) fn condition_operand(&mut self, operand: Operand) -> Operand {
+        let operand = self.truth(operand);
         if operand.is_error() || self.class(operand.ty) == Class::Bool && !matches!(operand.kind, Kind::Void) {
             return operand;
         }
         let (name, span) = (self.operand_name(&operand), operand.span);
         self.report(Code::TypeMismatch, span, format!("expected `BOOL`, found {name}"));
         self.error(span)
+    }
+
+    /// The literals 0 and 1 are FALSE and TRUE where a BOOL is needed.
+    fn truth(&mut self, operand: Operand) -> Operand {
+        if !operand.is_bit() {
+            return operand;
+        }
+        Operand { ty: self.bool_type(), flex: false, ..operand }
     }
 
     /// The operand's type for messages.
@@ -232,9 +245,14 @@ impl<'a> Lowering<'_, 'a> {
             return self.error(span);
         }
         use BinaryOp::*;
+        let (a, b) = match (self.class(a.ty), self.class(b.ty)) {
+            (Class::Bool, Class::Int(_)) => (a, self.truth(b)),
+            (Class::Int(_), Class::Bool) => (self.truth(a), b),
+            _ => (a, b),
+        };
         let (ca, cb) = (self.class(a.ty), self.class(b.ty));
         match (op, ca, cb) {
-            (And | Or | Xor | Eq | Ne, Class::Bool, Class::Bool) => {
+            (And | Or | Xor | Eq | Ne | Lt | Le | Gt | Ge, Class::Bool, Class::Bool) => {
                 let ty = self.bool_type();
                 let result = self.fold_or_emit(int_op(op, Elem::Bool), &[&a, &b], ty, span);
                 Operand { exact: true, ..result }
@@ -264,7 +282,7 @@ impl<'a> Lowering<'_, 'a> {
     fn int_binary(&mut self, op: BinaryOp, (a, x): (Operand, Elem), (b, y): (Operand, Elem), span: Span) -> Operand {
         let fits = |operand: &Operand, e: Elem| match operand.kind {
             Kind::Const(Value::Int(v)) if operand.flex => (range(e).0..=range(e).1).contains(&v),
-            _ => false,
+            _ => shifted(operand),
         };
         let (e, ty) = match (a.flex, b.flex) {
             (false, true) if fits(&b, x) => (x, a.ty),
@@ -280,24 +298,30 @@ impl<'a> Lowering<'_, 'a> {
             Type::Enum(_) if !is_comparison(op) => self.c.elem(e),
             _ => ty,
         };
-        let flex = a.flex && b.flex;
         if let (BinaryOp::Div, Kind::Const(Value::Int(0))) = (op, &b.kind) {
-            self.report(Code::DivisionByZero, b.span, "division by zero");
-            return self.error(span);
+            return self.constant_zero(&b, span);
+        }
+        if let (Kind::Const(Value::Int(x)), Kind::Const(Value::Int(y)), true, true) = (&a.kind, &b.kind, a.flex, b.flex)
+            && let Some(v) = of_literals(op, *x, *y)
+        {
+            return self.literal_result(v, span);
         }
         let comparison = is_comparison(op);
         let result_type = if comparison { self.bool_type() } else { ty };
         let result = self.fold_or_emit(int_op(op, e), &[&a, &b], result_type, span);
-        if let (Kind::Const(Value::Int(v)), true, false) = (&result.kind, flex, comparison) {
-            let v = *v;
-            let ty = self.literal_type(v);
-            return Operand { flex: true, ..self.constant(Value::Int(v), ty, span) };
+        let flex = a.flex && b.flex;
+        match op {
+            _ if comparison => Operand { exact: true, ..result },
+            BinaryOp::And | BinaryOp::Or | BinaryOp::Xor if !shifted(&a) && !shifted(&b) => {
+                Operand { exact: a.exact && b.exact, flex, ..result }
+            }
+            _ => Operand { flex, ..self.computed(result) },
         }
-        let exact = comparison || (matches!(op, BinaryOp::And | BinaryOp::Or | BinaryOp::Xor) && a.exact && b.exact);
-        match (result.kind, exact) {
-            (Kind::Temp(v), false) => self.computed(v, result_type, span),
-            (kind, exact) => Operand { kind, exact, ..self.temp(Local(0), result_type, span) },
-        }
+    }
+
+    fn constant_zero(&mut self, zero: &Operand, span: Span) -> Operand {
+        self.report(Code::DivisionByZero, zero.span, "division by zero");
+        self.error(span)
     }
 
     fn real_binary(&mut self, op: BinaryOp, a: Operand, b: Operand, span: Span) -> Operand {
@@ -335,13 +359,30 @@ impl<'a> Lowering<'_, 'a> {
             let ty = if a.flex { self.c.elem(Elem::Lint) } else { self.c.elem(x) };
             let flex = a.flex && b.flex;
             let result = self.fold_or_emit(Op::Expt, &[&a, &b], ty, span);
-            return Operand { flex: flex && matches!(result.kind, Kind::Const(_)), exact: false, ..result };
+            let result = Operand { flex: flex && matches!(result.kind, Kind::Const(_)), ..result };
+            return self.computed(result);
         }
         let single = self.is_single(&a, &b);
         let ty = self.c.elem(if single { Elem::Real } else { Elem::Lreal });
         let (a, b) = (self.as_real(a, ty), self.as_real(b, ty));
         let result = self.fold_or_emit(if single { Op::PowF32 } else { Op::PowF64 }, &[&a, &b], ty, span);
         Operand { exact: true, ..result }
+    }
+
+    /// `EXPT(a, b)`: LREAL for operands of any numeric type, so that `EXPT(10, -2)` is 0.01.
+    pub(crate) fn expt(&mut self, a: Operand, b: Operand, span: Span) -> Operand {
+        if a.is_error() || b.is_error() {
+            return self.error(span);
+        }
+        let numeric = |class| matches!(class, Class::Int(_) | Class::Real(_));
+        if !numeric(self.class(a.ty)) || !numeric(self.class(b.ty)) {
+            return self.bad_operands(BinaryOp::Power, &a, &b, span);
+        }
+        let flex = a.flex && b.flex;
+        let ty = self.c.elem(Elem::Lreal);
+        let (a, b) = (self.as_real(a, ty), self.as_real(b, ty));
+        let result = self.fold_or_emit(Op::PowF64, &[&a, &b], ty, span);
+        Operand { exact: true, flex: flex && matches!(result.kind, Kind::Const(_)), ..result }
     }
 
     fn pointer_binary(&mut self, op: BinaryOp, a: Operand, b: Operand, span: Span) -> Operand {
@@ -368,8 +409,11 @@ impl<'a> Lowering<'_, 'a> {
             }
             (Mul | Div, Class::Duration(_), Class::Int(_)) | (Mul, Class::Int(_), Class::Duration(_)) => {
                 let ty = if matches!(ca, Class::Duration(_)) { a.ty } else { b.ty };
+                if let (Div, Kind::Const(Value::Int(0))) = (op, &b.kind) {
+                    return self.constant_zero(&b, span);
+                }
                 let result = self.fold_or_emit(int_op(op, Elem::Lint), &[&a, &b], ty, span);
-                Operand { exact: false, flex: false, ..result }
+                self.computed(result)
             }
             (Mul | Div, Class::Duration(_), Class::Real(_)) | (Mul, Class::Real(_), Class::Duration(_)) => {
                 let lreal = self.c.elem(Elem::Lreal);
@@ -387,13 +431,14 @@ impl<'a> Lowering<'_, 'a> {
             }
             (Add | Sub, Class::Moment(x), Class::Duration(y)) => {
                 let (unit, duration) = moment_unit(x);
-                if y != duration {
+                if y == Elem::Ltime && duration == Elem::Time {
                     return self.bad_operands(op, &a, &b, span);
                 }
-                let ty = a.ty;
+                let (ty, span_type) = (a.ty, self.c.elem(duration));
+                let b = self.explicit(b, span_type);
                 let steps = self.scale(b, Op::Div, unit, ty, span);
                 let result = self.fold_or_emit(if op == Add { Op::Add } else { Op::Sub }, &[&a, &steps], ty, span);
-                Operand { exact: false, ..result }
+                self.computed(result)
             }
             _ => self.bad_operands(op, &a, &b, span),
         }
@@ -407,11 +452,10 @@ impl<'a> Lowering<'_, 'a> {
             _ => self.c.elem(e),
         };
         if let (BinaryOp::Div, Kind::Const(Value::Int(0))) = (op, &b.kind) {
-            self.report(Code::DivisionByZero, b.span, "division by zero");
-            return self.error(span);
+            return self.constant_zero(&b, span);
         }
         let result = self.fold_or_emit(int_op(op, e), &[&a, &b], ty, span);
-        Operand { exact: comparison, ..result }
+        if comparison { Operand { exact: true, ..result } } else { self.computed(result) }
     }
 
     fn scale(&mut self, a: Operand, op: Op, unit: i64, ty: TypeId, span: Span) -> Operand {
@@ -421,7 +465,7 @@ impl<'a> Lowering<'_, 'a> {
         let lint = self.c.elem(Elem::Lint);
         let unit = self.constant(Value::Int(unit.into()), lint, span);
         let result = self.fold_or_emit(op, &[&a, &unit], ty, span);
-        Operand { exact: false, ..result }
+        self.computed(result)
     }
 
     /// Applies an IR operator: at once if all operands are constant, else as an instruction.
@@ -491,6 +535,23 @@ pub(crate) fn int_op(op: BinaryOp, e: Elem) -> Op {
         (BinaryOp::And | BinaryOp::AndThen, _) => Op::And,
         (BinaryOp::Or | BinaryOp::OrElse, _) => Op::Or,
         (BinaryOp::Xor, _) => Op::Xor,
+    }
+}
+
+/// Whether this is a literal shifted by a variable: its value may exceed any type it is needed in.
+fn shifted(operand: &Operand) -> bool {
+    operand.flex && !matches!(operand.kind, Kind::Const(_))
+}
+
+/// What arithmetic of two literals come to, without a limit of width; `None` for the others.
+fn of_literals(op: BinaryOp, x: i128, y: i128) -> Option<i128> {
+    match op {
+        BinaryOp::Add => Some(x + y),
+        BinaryOp::Sub => Some(x - y),
+        BinaryOp::Mul => x.checked_mul(y),
+        BinaryOp::Div => x.checked_div(y),
+        BinaryOp::Mod => Some(x.checked_rem(y).unwrap_or(0)),
+        _ => None,
     }
 }
 

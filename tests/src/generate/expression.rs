@@ -90,7 +90,7 @@ impl Generator {
             return if self.random.chance(20) { self.literal(s) } else { path };
         }
         let d = depth - 1;
-        match self.random.below(30) {
+        match self.random.below(32) {
             0..=7 => self.arithmetic(path, of, d),
             8..=9 => format!("({path} {} {})", self.random.pick(&["+", "-", "*", "AND", "OR", "XOR", "MOD"]), self.small()),
             10 => format!("(-{path})"),
@@ -111,6 +111,8 @@ impl Generator {
             26 => format!("STRING_TO_{}({})", s.name, self.text(d)),
             27 => self.ratio().unwrap_or(path),
             28 => format!("{}({path}, {})", self.random.pick(&["ADD", "SUB", "MUL", "MOD"]), self.int(d)),
+            29 => self.shifted_literal(&path, d),
+            30 => format!("DIV({path}, {})", self.divisor(of)),
             _ => path,
         }
     }
@@ -153,6 +155,18 @@ impl Generator {
         format!("{name}({path}, {count})")
     }
 
+    /// A literal shifted by a variable, alone or beside another.
+    fn shifted_literal(&mut self, path: &str, d: usize) -> String {
+        let literal = self.random.pick(&["0", "1", "255", "16#FFFF", "16#1_0000_0000"]);
+        let name = self.random.pick(&["SHL", "SHR", "ROL", "ROR"]);
+        let op = self.random.pick(&["AND", "OR", "XOR", "+", "-", "*"]);
+        match self.random.below(3) {
+            0 => format!("{name}({literal}, {path})"),
+            1 => format!("({path} {op} {name}({literal}, {}))", self.int(d)),
+            _ => format!("({name}({literal}, {path}) {op} {})", self.int(d)),
+        }
+    }
+
     /// `X_TO_Y` from an integer, or `TO_Y` from anything scalar.
     fn conversion(&mut self, to: &'static Scalar, d: usize) -> String {
         let from = &SCALARS[self.random.below(SCALARS.len())];
@@ -166,7 +180,7 @@ impl Generator {
     }
 
     fn power(&mut self, path: &str, d: usize) -> String {
-        if self.random.chance(50) { format!("EXPT({path}, {})", self.int(d)) } else { format!("({path} ** {})", self.int(d)) }
+        if self.random.chance(50) { format!("TO_LINT(EXPT({path}, {}))", self.int(d)) } else { format!("({path} ** {})", self.int(d)) }
     }
 
     /// A part of an integer variable.
@@ -222,6 +236,8 @@ impl Generator {
             7..=10 => format!("{}({})", self.random.pick(REAL_FUNCTIONS), self.real(s, d)),
             11 => format!("ATAN2({path}, {})", self.real(s, d)),
             12 => format!("({path} ** {})", self.real(s, d)),
+            _ if self.random.chance(4) => format!("EXPT({path}, {})", if self.random.chance(50) { self.real(s, d) } else { self.int(d) }),
+            _ if self.random.chance(4) => format!("MUX({}, {path}, {}, {})", self.int(0), self.real(s, 0), self.int(d)),
             13 => format!("ABS({})", self.real(s, d)),
             14 => format!("{}({path}, {})", self.random.pick(&["MIN", "MAX"]), self.real(s, d)),
             15 => format!("SEL({}, {path}, {})", self.boolean(d), self.real(s, d)),
@@ -250,8 +266,9 @@ impl Generator {
         match self.random.below(16) {
             0..=4 => self.comparison(d),
             5..=7 => {
-                let op = self.random.pick(&["AND", "OR", "XOR", "AND_THEN", "OR_ELSE", "AND_THEN", "=", "<>"]);
-                format!("({} {op} {})", self.boolean(d), self.boolean(d))
+                let op = self.random.pick(&["AND", "OR", "XOR", "AND_THEN", "OR_ELSE", "AND_THEN", "=", "<>", "<", "<=", ">", ">="]);
+                let right = if self.random.chance(10) { self.random.pick(&["0", "1"]).into() } else { self.boolean(d) };
+                format!("({} {op} {right})", self.boolean(d))
             }
             8 => format!("(NOT {})", self.boolean(d)),
             9 => format!("SEL({path}, {}, {})", self.boolean(d), self.boolean(d)),
@@ -306,7 +323,7 @@ impl Generator {
             return path;
         }
         let d = depth - 1;
-        match self.random.below(12) {
+        match self.random.below(13) {
             0 => self.literal(s),
             1..=3 => format!("({path} {} {})", self.random.pick(&["+", "-"]), self.duration(s, d)),
             4 => format!("({path} * {})", self.int(d)),
@@ -315,17 +332,33 @@ impl Generator {
             7 => format!("{}({path}, {})", self.random.pick(&["MIN", "MAX"]), self.duration(s, d)),
             8 => if s.bits == 32 { "TIME()" } else { "LTIME()" }.into(),
             9 => self.conversion(s, d),
-            10 if s.bits == 32 => format!("({} - {})", self.moment(named("DT"), 0), self.moment(named("DT"), 0)),
-            10 => format!("({} - {})", self.moment(named("LDT"), 0), self.moment(named("LDT"), 0)),
+            10 => {
+                let dates = if s.bits == 32 { ["DT", "DATE", "TOD"] } else { ["LDT", "LDATE", "LTOD"] };
+                let date = named(self.random.pick(&dates));
+                format!("({} - {})", self.moment(date, 0), self.moment(date, d))
+            }
+            11 => self.chosen_duration(s, path, d),
             _ => format!("({path} MOD {})", self.duration(s, 0)),
+        }
+    }
+
+    fn chosen_duration(&mut self, s: &'static Scalar, path: String, d: usize) -> String {
+        match self.random.below(5) {
+            0 => format!("(-{path})"),
+            1 => format!("SEL({}, {path}, {})", self.boolean(d), self.duration(s, d)),
+            2 => format!("LIMIT({}, {path}, {})", self.duration(s, 0), self.duration(s, d)),
+            3 => format!("MUX({}, {path}, {})", self.int(0), self.duration(s, d)),
+            _ => format!("({} * {path})", if self.random.chance(50) { self.int(d) } else { self.real(named("REAL"), d) }),
         }
     }
 
     /// An expression of a date type.
     fn moment(&mut self, s: &'static Scalar, depth: usize) -> String {
         let path = self.place(s).unwrap_or_else(|| self.literal(s));
-        let duration = named(if s.bits == 32 { "TIME" } else { "LTIME" });
-        match self.random.below(6) {
+        let duration = named(if s.bits == 32 || self.random.chance(30) { "TIME" } else { "LTIME" });
+        match self.random.below(8) {
+            6 if depth > 0 => format!("{}({path}, {})", self.random.pick(&["MIN", "MAX"]), self.moment(s, depth - 1)),
+            7 if depth > 0 => format!("SEL({}, {path}, {})", self.boolean(depth - 1), self.moment(s, 0)),
             0 => self.literal(s),
             1 | 2 if depth > 0 => format!("({path} {} {})", self.random.pick(&["+", "-"]), self.duration(duration, depth - 1)),
             3 if depth > 0 => self.conversion(s, depth - 1),
