@@ -107,6 +107,8 @@ codes! {
     E0401 NoProgram "nothing to run: no program or task",
     E0402 BadTask "a task or configuration is not usable",
     E0403 TooLarge "the program needs more memory than an application may have",
+    E0501 BadFile "a source file is not what its name says, or is damaged",
+    E0502 OtherLanguage "a body is written in another language than Structured Text",
     W0301 LossyConversion "an implicit conversion may lose information",
     W0302 ResultUnused "a value is computed and not used",
     W0303 SharedData "two tasks use a variable and one may see it half changed",
