@@ -114,6 +114,8 @@ codes! {
     E0403 TooLarge "the program needs more memory than an application may have",
     W0101 NoEffect "a declaration that has no effect",
     W0102 WarningPragma "the program says `{warning}` itself",
+    E0501 BadFile "a source file is not what its name says, or is damaged",
+    E0502 OtherLanguage "a body is written in another language than Structured Text",
     W0301 LossyConversion "an implicit conversion may lose information",
     W0302 ResultUnused "a value is computed and not used",
     W0303 SharedData "two tasks use a variable and one may see it half changed",

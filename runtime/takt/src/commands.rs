@@ -2,6 +2,7 @@
 
 mod check;
 mod explain;
+mod import;
 mod live;
 mod run;
 mod summary;
@@ -35,6 +36,8 @@ enum Command {
     Run(RunArgs),
     /// Finds the mistakes in a program or a project.
     Check(CheckArgs),
+    /// Makes a project of TwinCAT's files, PLCopen XML or ST.
+    Import(ImportArgs),
     /// Explains a code like E0301.
     Explain(ExplainArgs),
 }
@@ -88,6 +91,22 @@ struct CheckArgs {
     /// How findings are shown.
     #[arg(long, value_name = "FORMAT", default_value = "text")]
     format: Format,
+}
+
+#[derive(Debug, Clone, Args)]
+struct ImportArgs {
+    /// A folder with a .plcproj, or files: .TcPOU, .TcDUT, .TcGVL, .TcIO, .TcTTO, .plcproj, PLCopen .xml, .st.
+    #[arg(required = true, value_name = "SRC")]
+    paths: Vec<PathBuf>,
+    /// The folder of the new project; it must not exist.
+    #[arg(long, value_name = "FOLDER")]
+    to: PathBuf,
+    /// Name of the project. Default: the name of the folder.
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -148,6 +167,7 @@ pub fn execute(cli: Cli) -> Exit {
     match cli.command {
         Command::Run(args) => run::execute(&args),
         Command::Check(args) => check::execute(&args.paths, args.format),
+        Command::Import(args) => import::execute(&args),
         Command::Explain(args) => explain::execute(args.code.as_deref()),
     }
 }

@@ -3,6 +3,8 @@
 use crate::manifest::{Arithmetic, Located};
 use crate::messages::Spot;
 use crate::project::Project;
+use crate::sources::{Origin, Sources};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use takt_abi::Library;
@@ -41,6 +43,7 @@ pub struct Compiled {
     first_condition: usize,
     spans: Vec<Option<Range<usize>>>,
     manifest: Option<(String, String)>,
+    origins: BTreeMap<usize, Arc<Origin>>,
 }
 
 /// Compiles a project with conditions in global scope.
@@ -54,7 +57,23 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
         defines: project.manifest.defines.clone(),
         conditions: conditions.iter().map(|condition| Source { name: name(condition), text: condition.text.clone() }).collect(),
     };
-    let output = takt_compile::compile(takt_compile::Input { sources: &project.sources.list, libraries: LIBRARIES, options: &options });
+    // What is missing from a file that cannot be read would only be said again as unknown names.
+    let is_readable = project.sources.findings.iter().all(|finding| finding.code != takt_syntax::Code::BadFile);
+    let sources: &[Source] = if is_readable { &project.sources.list } else { &[] };
+    let mut output = takt_compile::compile(takt_compile::Input { sources, libraries: LIBRARIES, options: &options });
+    if is_readable {
+        output.diagnostics.extend(project.sources.findings.iter().cloned());
+        output.diagnostics.sort_by_key(|d| (d.span.file, d.span.start, d.span.end, d.code));
+    } else {
+        output.diagnostics.clone_from(&project.sources.findings);
+        output.files.clone_from(&project.sources.list);
+    }
+    if !project.sources.findings.is_empty() {
+        output.program = None;
+    }
+    if let Some(program) = &mut output.program {
+        move_sites(program, &project.sources);
+    }
     Compiled {
         program: output.program.map(Arc::new),
         diagnostics: output.diagnostics,
@@ -63,6 +82,24 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
         first_condition: project.sources.list.len(),
         spans: conditions.iter().map(|condition| condition.span.clone()).collect(),
         manifest: project.manifest_file.clone(),
+        origins: project.sources.origins.clone(),
+    }
+}
+
+/// Places of faults are those of the files that people edit.
+fn move_sites(program: &mut Program, sources: &Sources) {
+    for (&index, origin) in &sources.origins {
+        let Some(source) = sources.list.get(index) else { continue };
+        let lines = origin.lines(&source.text);
+        for site in program.sites.iter_mut().filter(|site| site.file as usize == index) {
+            let Some((file, line, column)) = lines.place(site.line, site.column) else { continue };
+            let known = if file == source.name { Some(index) } else { program.files.iter().position(|name| name == file) };
+            let file = known.unwrap_or_else(|| {
+                program.files.push(file.into());
+                program.files.len() - 1
+            });
+            (site.file, site.line, site.column) = (file as u32, line, column);
+        }
     }
 }
 
@@ -88,6 +125,10 @@ impl Compiled {
             let verbatim = text.get(inside.clone()) == self.files.get(index).map(|file| file.text.as_str());
             let shown = if verbatim { inside.start + range.start..inside.start + range.end } else { place.clone() };
             return Spot::new(name, text, shown);
+        }
+        if let Some(origin) = self.origins.get(&index) {
+            let (file, range) = origin.place(range);
+            return Spot::new(&file.name, &file.text, range);
         }
         match self.files.get(index) {
             Some(file) => Spot::new(&file.name, &file.text, range),

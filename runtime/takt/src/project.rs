@@ -107,8 +107,12 @@ fn folder_name(folder: &Path) -> String {
 
 fn read_manifest(project: &mut Project, path: &Path) -> Result<(), ProjectError> {
     let bytes = std::fs::read(path).map_err(|error| ProjectError::Unreadable(path.into(), error))?;
-    let (text, _) = sources::decode(bytes);
     let name = path.to_string_lossy().into_owned();
+    let (text, _) = sources::decode(bytes).map_err(|wrong| {
+        let span = wrong.before.len()..wrong.before.len();
+        let error = ManifestError { span, message: wrong.message, help: "save it as UTF-8".into() };
+        ProjectError::Manifest(ManifestErrors { file: name.clone(), text: wrong.before, errors: vec![error] })
+    })?;
     project.manifest = manifest::read(&name, &text).map_err(ProjectError::Manifest)?;
     project.manifest_file = Some((name, text));
     Ok(())
@@ -121,7 +125,7 @@ fn source_folders(project: &Project, folder: &Path) -> Result<Vec<PathBuf>, Proj
     let mut errors = Vec::new();
     for source in &project.manifest.sources {
         if let Some(message) = refused(source, folder) {
-            errors.push(ManifestError { span: source.span.clone(), message, help: "name a folder or an .st file of the project".into() });
+            errors.push(ManifestError { span: source.span.clone(), message, help: "name a folder or a source file of the project".into() });
         }
     }
     if errors.is_empty() {

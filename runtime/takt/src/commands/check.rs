@@ -14,7 +14,7 @@ pub(super) fn execute(paths: &[PathBuf], format: Format) -> Exit {
         Ok(project) => project,
         Err(error) => return refuse(&error, format),
     };
-    super::run::tell_encodings(&project);
+    super::run::tell_encodings(&project.sources);
     let compiled = program::compile(&project, &conditions(&project));
     match format {
         Format::Text => tell(&compiled),

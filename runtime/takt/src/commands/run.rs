@@ -7,6 +7,7 @@ use crate::language::{self, Word};
 use crate::machine::{BuildError, End, Machine, Setup};
 use crate::plot::Recording;
 use crate::project::{self, Project};
+use crate::sources::Sources;
 use crate::trace::{self, Trace};
 use crate::{messages, platform};
 use std::fs::File;
@@ -37,7 +38,7 @@ pub(super) fn execute(args: &RunArgs) -> Exit {
 
 fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     let project = project::load_all(&args.paths).map_err(|error| check::refuse(&error, Format::Text))?;
-    tell_encodings(&project);
+    tell_encodings(&project.sources);
     let speed = speed(args, &project);
     let mut machine = build(args, &project, speed)?;
     for (variable, value) in &args.set {
@@ -237,9 +238,9 @@ fn rest(machine: &mut Machine, pace: &Pace) {
 }
 
 /// Says which sources were not UTF-8.
-pub(super) fn tell_encodings(project: &Project) {
+pub(super) fn tell_encodings(sources: &Sources) {
     let language = language::of_environment();
-    for (file, encoding) in &project.sources.converted {
+    for (file, encoding) in &sources.converted {
         console::tell(format_args!("{file} {} {}", Word::ReadAs.text(language), encoding.name()));
     }
 }

@@ -107,7 +107,7 @@ mod tests {
 
     fn run(text: &str, scans: usize) -> Machine {
         let source = Source { name: "main.st".into(), text: text.into() };
-        let sources = Sources { list: vec![source], converted: Vec::new() };
+        let sources = Sources { list: vec![source], ..Sources::default() };
         let project = Project { root: std::env::temp_dir(), sources, ..Project::default() };
         let mut machine = Machine::new(&project, Setup::default()).unwrap_or_else(|error| panic!("{error}"));
         (0..scans).for_each(|_| {

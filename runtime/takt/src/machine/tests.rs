@@ -48,7 +48,7 @@ fn project(manifest: &str, program: &str) -> Project {
         root: std::env::temp_dir(),
         manifest: crate::manifest::read("takt.toml", manifest).unwrap(),
         manifest_file: Some(("takt.toml".into(), manifest.into())),
-        sources: Sources { list: vec![source("GVL.st", GVL), source("main.st", program)], converted: Vec::new() },
+        sources: Sources { list: vec![source("GVL.st", GVL), source("main.st", program)], ..Sources::default() },
     }
 }
 
