@@ -1,6 +1,7 @@
 //! Calls: functions, blocks, programs, actions, native functions.
 
 use crate::body::Passing;
+use crate::enable::is_enable;
 use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
 use crate::object::Target;
 use crate::operator::Class;
@@ -55,8 +56,8 @@ impl<'a> Lowering<'_, 'a> {
                 self.check_arguments(args);
                 self.error(span)
             }
-            Thing::List(_) | Thing::Library => {
-                self.report(Code::NotCallable, callee.span, "a list or library cannot be called");
+            Thing::List(_) | Thing::Space(_) => {
+                self.report(Code::NotCallable, callee.span, "a list, library or namespace cannot be called");
                 self.error(span)
             }
         }
@@ -78,7 +79,7 @@ impl<'a> Lowering<'_, 'a> {
     fn match_arguments(&mut self, callee: &str, names: &[(&str, Section)], args: &'a [Arg]) -> Vec<(usize, &'a Arg)> {
         let mut matched: Vec<(usize, &'a Arg)> = Vec::new();
         let positional: Vec<usize> = names.iter().enumerate().filter(|(_, n)| n.1 != Section::State).map(|(i, _)| i).collect();
-        for (position, arg) in args.iter().enumerate() {
+        for (position, arg) in args.iter().filter(|arg| !is_enable(arg, names)).enumerate() {
             let found = match &arg.name {
                 Some(name) => names.iter().position(|(n, s)| key(n) == key(&name.text) && *s != Section::State),
                 None => positional.get(position).copied(),
@@ -111,6 +112,11 @@ impl<'a> Lowering<'_, 'a> {
         matched
     }
 
+    /// How many arguments are for parameters.
+    fn given(&self, names: &[(&str, Section)], args: &[Arg]) -> usize {
+        args.iter().filter(|arg| !is_enable(arg, names)).count()
+    }
+
     fn wrong_argument(&mut self, callee: &str, names: &[(&str, Section)], arg: &'a Arg, found: usize, most: usize) {
         arg.value.iter().for_each(|v| drop(self.expr(v)));
         match &arg.name {
@@ -138,6 +144,7 @@ impl<'a> Lowering<'_, 'a> {
         let is_preset = |i: usize| preset.iter().any(|(p, _)| *p == i);
         let names: Vec<(&str, Section)> =
             vars.iter().enumerate().map(|(i, v)| (v.name.as_str(), if is_preset(i) { Section::State } else { section(v.kind) })).collect();
+        let enable = self.enable(&names, args);
         let matched = self.match_arguments(&name, &names, args);
         let before = self.c.diagnostics.len();
         let mut words: Vec<Option<Vec<Local>>> = vec![None; vars.len()];
@@ -150,7 +157,7 @@ impl<'a> Lowering<'_, 'a> {
             }
         }
         let mut outputs = Vec::new();
-        let all_known = matched.len() == args.len();
+        let all_known = matched.len() == self.given(&names, args);
         for (i, v) in vars.iter().enumerate() {
             let given = matched.iter().find(|(n, _)| *n == i).map(|(_, a)| *a);
             if words[i].is_none() && given.is_none_or(|_| v.kind == VarKind::Output) && (all_known || v.kind == VarKind::Output) {
@@ -175,6 +182,7 @@ impl<'a> Lowering<'_, 'a> {
             }
         });
         self.assign_outputs(outputs);
+        let value = self.end_enable(enable, value, span);
         if failed { self.error(span) } else { value }
     }
 
@@ -405,6 +413,7 @@ impl<'a> Lowering<'_, 'a> {
         };
         let Kind::Place(place @ Place::Memory { .. }) = instance.kind.clone() else { return self.error(span) };
         let names: Vec<(&str, Section)> = structure.fields.iter().map(|f| (f.name.as_str(), f.section)).collect();
+        let enable = self.enable(&names, args);
         let matched = self.match_arguments(&structure.name, &names, args);
         for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Input) {
             self.set_input(&place, &structure.fields[*i], arg);
@@ -412,7 +421,7 @@ impl<'a> Lowering<'_, 'a> {
         for (i, field) in structure.fields.iter().enumerate().filter(|(_, f)| f.section == Section::InOut) {
             match matched.iter().find(|(n, _)| *n == i) {
                 Some((_, arg)) => self.set_in_out(&place, field, arg),
-                None if matched.len() != args.len() => {}
+                None if matched.len() != self.given(&names, args) => {}
                 None => {
                     let (wanted, name) = (self.type_name(field.ty), &structure.name);
                     self.report(
@@ -429,7 +438,8 @@ impl<'a> Lowering<'_, 'a> {
             let value = self.at(place.inside(field.offset), field.ty, arg.span);
             self.assign_output(arg, value);
         }
-        self.void(span)
+        let nothing = self.void(span);
+        self.end_enable(enable, nothing, span)
     }
 
     fn invoke(&mut self, instance: &Operand, structure: &Structure, place: &Place, span: Span) {
@@ -518,9 +528,10 @@ impl<'a> Lowering<'_, 'a> {
 
     pub(crate) fn call_native(&mut self, desc: &'static FnDesc, args: &'a [Arg], span: Span) -> Operand {
         let names: Vec<(&str, Section)> = desc.params.iter().map(|p| (p.name, Section::Input)).collect();
+        let enable = self.enable(&names, args);
         let matched = self.match_arguments(desc.name, &names, args);
         let mut operands: Vec<Option<Operand>> = vec![None; desc.params.len()];
-        let mut failed = matched.len() != args.len();
+        let mut failed = matched.len() != self.given(&names, args);
         for (i, arg) in matched {
             operands[i] = arg.value.as_ref().map(|v| self.expr(v));
         }
@@ -536,7 +547,8 @@ impl<'a> Lowering<'_, 'a> {
         if failed || operands.iter().any(Operand::is_error) {
             return self.error(span);
         }
-        self.native_with(desc, operands, span)
+        let value = self.native_with(desc, operands, span);
+        self.end_enable(enable, value, span)
     }
 
     /// Calls a native function with as many operands as it has parameters.

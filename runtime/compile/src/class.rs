@@ -63,14 +63,17 @@ impl<'a> Compiler<'a> {
         }
         for (owner, name) in std::mem::take(&mut self.extends) {
             if let Owner::Pou(pou) = owner {
+                self.home = self.pous[pou].home;
                 self.link_base(pou, name);
             }
         }
         for (pou, name) in std::mem::take(&mut self.implements) {
+            self.home = self.pous[pou].home;
             if let Some(interface) = self.named_interface(name) {
                 self.pous[pou].implements.push(interface);
             }
         }
+        self.home = None;
         for pou in 0..self.pous.len() {
             if self.pous[pou].base.is_none() {
                 self.number(pou);
@@ -80,6 +83,7 @@ impl<'a> Compiler<'a> {
 
     fn link_interface(&mut self, i: usize) {
         let tree = self.interfaces[i].tree;
+        self.home = Some(&tree.home);
         for name in &tree.extends {
             let Some(base) = self.named_interface(name) else { continue };
             if base == i || self.interface_extends(base, i) {
@@ -135,13 +139,7 @@ impl<'a> Compiler<'a> {
 
     /// `Name` or `Library.Name`.
     fn qualified_item(&self, name: &str) -> Option<Item> {
-        match name.split_once('.') {
-            Some((library, name)) if matches!(self.global_name(library), Some(Item::Library)) => {
-                self.library_names.get(&key(name)).copied()
-            }
-            Some(_) => None,
-            None => self.global_name(name),
-        }
+        self.path_item(name.split('.'))
     }
 
     /// Numbers a block and what extends it, one behind the other, so that the classes of a type lie together.

@@ -97,6 +97,9 @@ impl<'a> Lowering<'_, 'a> {
         match self.c.types.get(ty).clone() {
             Type::Array { elem, .. } => {
                 let count = self.c.types.size(ty) / self.c.types.size(elem).max(1);
+                if let Some(decl) = decl.filter(|d| !d.fb_inits.is_empty()) {
+                    return self.construct_listed(place, elem, count, decl, span);
+                }
                 self.each(place, elem, count, span, &mut |l, place| l.construct(place, elem, None, args, span));
                 if let Some(init) = decl.and_then(|d| d.init.as_ref()).filter(|_| self.c.constructs(elem)) {
                     self.set_again(place, ty, init);
@@ -107,6 +110,18 @@ impl<'a> Lowering<'_, 'a> {
                 None => self.construct_structure(place, ty),
             },
             _ => {}
+        }
+    }
+
+    /// The elements of an array with arguments of FB_Init for each.
+    fn construct_listed(&mut self, place: &Place, elem: TypeId, count: u32, decl: &'a VarDecl, span: Span) {
+        if decl.fb_inits.len() != count as usize {
+            let found = decl.fb_inits.len();
+            self.report(takt_syntax::Code::BadInitializer, span, format!("the array has {count} elements, found arguments for {found}"));
+        }
+        let stride = self.c.types.size(elem);
+        for (i, args) in (0..count).zip(&decl.fb_inits) {
+            self.construct(&place.inside(i * stride), elem, None, args, span);
         }
     }
 

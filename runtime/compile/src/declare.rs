@@ -14,15 +14,23 @@ impl<'a> Compiler<'a> {
                 self.collect_unit(file, unit);
             }
         }
+        self.home = None;
     }
 
     fn collect_unit(&mut self, file: usize, unit: &'a Unit) {
         let library = file >= self.user_files;
+        self.enter_home(match unit {
+            Unit::Pou(unit) => &unit.home,
+            Unit::Type(unit) => &unit.home,
+            Unit::Globals(unit) => &unit.home,
+            Unit::Configuration(unit) => &unit.home,
+            Unit::Interface(unit) => &unit.home,
+        });
         match unit {
             Unit::Pou(tree) => self.collect_pou(library, tree),
             Unit::Type(tree) => {
                 let index = self.declared.len();
-                self.declared.push(Declared { tree, state: Progress::Untouched, ty: None });
+                self.declared.push(Declared { tree, home: self.home, state: Progress::Untouched, ty: None });
                 self.add(library, &tree.name, Item::Type(index));
                 let qualified = tree.pragmas.iter().any(|p| p.name == "qualified_only");
                 if let (TypeKind::Enum(body), false) = (&tree.kind, qualified) {
@@ -67,7 +75,9 @@ impl<'a> Compiler<'a> {
         let index = self.push_pou(head, library, None);
         let mut members = self.collect_members(library, Owner::Pou(index), &tree.methods, &tree.properties);
         for action in &tree.actions {
-            let head = Head { kind: PouKind::Action, name: &action.name, body: &action.body, vars: &[], result: None, ..head };
+            let (pragmas, doc) = (action.pragmas.as_slice(), action.doc.as_deref());
+            let head =
+                Head { kind: PouKind::Action, name: &action.name, body: &action.body, vars: &[], result: None, pragmas, doc, ..head };
             let unit = self.push_pou(head, library, Some(Owner::Pou(index)));
             self.add_member(&mut members, &action.name, Member::Action(unit));
         }
@@ -91,6 +101,7 @@ impl<'a> Compiler<'a> {
             result: None,
             vars: Vec::new(),
             index: HashMap::new(),
+            home: self.home,
             instance: 0,
             body: None,
             start: None,
@@ -102,6 +113,7 @@ impl<'a> Compiler<'a> {
             implements: Vec::new(),
             class: 0,
             kept: HashMap::new(),
+            enumerators: HashMap::new(),
         });
         self.pous.len() - 1
     }
@@ -130,13 +142,15 @@ impl<'a> Compiler<'a> {
             self.add_member(&mut members, &method.name, Member::Method(unit));
         }
         for property in properties {
-            let mut accessor = |part: &'a Option<(Vec<tree::VarBlock>, Vec<tree::Stmt>)>, result: Option<&'a tree::TypeExpr>| {
+            let mut accessor = |part: &'a Option<(Vec<tree::VarBlock>, Vec<tree::Stmt>)>, access, result: Option<&'a tree::TypeExpr>| {
                 let (vars, body) = part.as_ref()?;
-                let (name, modifiers) = (&property.name, property.modifiers);
-                let head = Head { kind: PouKind::Method, name, modifiers, result, vars, body, pragmas: &[], doc: None };
+                let (name, modifiers) = (&property.name, tree::Modifiers { access, ..property.modifiers });
+                let (pragmas, doc) = (property.pragmas.as_slice(), property.doc.as_deref());
+                let head = Head { kind: PouKind::Method, name, modifiers, result, vars, body, pragmas, doc };
                 Some(self.push_pou(head, library, Some(owner)))
             };
-            let (get, set) = (accessor(&property.get, Some(&property.ty)), accessor(&property.set, None));
+            let get = accessor(&property.get, property.get_access, Some(&property.ty));
+            let set = accessor(&property.set, property.set_access, None);
             self.add_member(&mut members, &property.name, Member::Property { get, set });
         }
         members
@@ -173,7 +187,15 @@ impl<'a> Compiler<'a> {
         for decl in &block.vars {
             let index = self.globals.len();
             let kind = if block.kind == VarKind::Config { VarKind::Config } else { VarKind::Global };
-            self.globals.push(GlobalVar { var: None, list, decl, kind, constant: block.constant, state: Progress::Untouched });
+            self.globals.push(GlobalVar {
+                var: None,
+                list,
+                decl,
+                kind,
+                home: self.home,
+                constant: block.constant,
+                state: Progress::Untouched,
+            });
             match list {
                 Some(list) => {
                     if self.lists[list].vars.insert(key(&decl.name.text), index).is_some() {
@@ -191,50 +213,47 @@ impl<'a> Compiler<'a> {
     }
 
     fn add_global(&mut self, library: bool, name: &str, index: usize) {
+        let key = self.entered(name);
         let names = if library { &mut self.library_names } else { &mut self.names };
-        match names.get(&key(name)) {
+        match names.get(&key) {
             None => {
-                names.insert(key(name), Item::Global(index));
+                names.insert(key, Item::Global(index));
             }
             Some(Item::Global(_)) => {
-                names.insert(key(name), Item::Ambiguous);
+                names.insert(key, Item::Ambiguous);
             }
             Some(_) => {}
         }
     }
 
     fn add(&mut self, library: bool, name: &tree::Name, item: Item) {
+        let key = self.entered(&name.text);
         let names = if library { &mut self.library_names } else { &mut self.names };
-        let weak = matches!(names.get(&key(&name.text)), None | Some(Item::Member(..) | Item::Global(_) | Item::List(_) | Item::Ambiguous));
+        let weak = matches!(names.get(&key), None | Some(Item::Member(..) | Item::Global(_) | Item::List(_) | Item::Ambiguous));
         if weak || library {
-            names.insert(key(&name.text), item);
-            self.declared_at.entry(key(&name.text)).or_insert(name.span);
+            names.insert(key.clone(), item);
+            self.declared_at.entry(key).or_insert(name.span);
             return;
         }
-        let first: Option<Span> = self.declared_at.get(&key(&name.text)).copied();
+        let first: Option<Span> = self.declared_at.get(&key).copied();
         let diagnostic = self.report(Code::DuplicateName, name.span, format!("`{}` is declared twice", name.text));
         if let Some(first) = first {
             diagnostic.notes.push(takt_syntax::Note { span: first, message: "first declared here".into() });
         }
     }
 
-    fn add_bare(&mut self, library: bool, name: &str, item: Item) {
+    pub(crate) fn add_bare(&mut self, library: bool, name: &str, item: Item) {
+        let key = self.entered(name);
         let names = if library { &mut self.library_names } else { &mut self.names };
-        match (names.get(&key(name)), item) {
+        match (names.get(&key), item) {
             (None, _) => {
-                names.insert(key(name), item);
+                names.insert(key, item);
             }
             (Some(Item::Member(..)), Item::Member(..)) => {
-                names.insert(key(name), Item::Ambiguous);
+                names.insert(key, Item::Ambiguous);
             }
             _ => {}
         }
-    }
-
-    /// What a name means outside of any unit: the user's first, then the libraries'.
-    pub(crate) fn global_name(&self, name: &str) -> Option<Item> {
-        let key = key(name);
-        self.names.get(&key).or_else(|| self.library_names.get(&key)).copied()
     }
 }
 

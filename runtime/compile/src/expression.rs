@@ -9,7 +9,7 @@ use crate::types::{elementary, nearest};
 use crate::unit::Compiler;
 use takt_abi::{Elem, FnDesc, Section};
 use takt_ir::{Base, BlockId, Body, BodyId, Const, Local, SiteId, StructKind, Type, TypeId};
-use takt_syntax::tree::{Expr, ExprKind, Literal, LiteralValue, Name, VarKind};
+use takt_syntax::tree::{Expr, ExprKind, Literal, LiteralValue, Name, Part, VarKind};
 use takt_syntax::{Code, Diagnostic, Span};
 
 /// What an expression came to.
@@ -63,7 +63,8 @@ pub(crate) enum Thing {
     Value(Operand),
     List(usize),
     Type(TypeId),
-    Library,
+    /// A library or namespace.
+    Space(Item),
     Function(usize),
     Native(&'static FnDesc),
     /// A method, property or action and the instance it runs on.
@@ -278,8 +279,8 @@ impl<'c, 'a> Lowering<'c, 'a> {
                     self.report(Code::TypeMismatch, e.span, format!("expected a value, found the type `{name}`"));
                     self.error(e.span)
                 }
-                Thing::List(_) | Thing::Library => {
-                    self.report(Code::TypeMismatch, e.span, "expected a value, found the name of a list or library");
+                Thing::List(_) | Thing::Space(_) => {
+                    self.report(Code::TypeMismatch, e.span, "expected a value, found the name of a list, library or namespace");
                     self.error(e.span)
                 }
             },
@@ -380,8 +381,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
             let (ty, storage) = (*ty, storage.clone());
             return Thing::Value(self.stored(&storage, ty, span));
         }
-        match self.own_member(&wanted, span) {
-            Some(thing) => thing,
+        if let Some(thing) = self.own_member(&wanted, span) {
+            return thing;
+        }
+        match self.levels.iter().find_map(|l| self.c.pous[l.pou].enumerators.get(&wanted).copied()) {
+            Some((ty, value)) => Thing::Value(self.constant(Value::Int(value.into()), ty, span)),
             None => self.global_thing(name, span),
         }
     }
@@ -466,7 +470,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
             Item::Ready(ty) | Item::NativeBlock(ty) => Thing::Type(ty),
             Item::NativeFunction(desc) => Thing::Native(desc),
             Item::List(i) => Thing::List(i),
-            Item::Library => Thing::Library,
+            Item::Library | Item::Namespace(_) => Thing::Space(item),
             Item::Enumerator(ty, value) => Thing::Value(self.constant(Value::Int(value.into()), ty, span)),
             Item::Member(declared, member) => self.declared_member(declared, member, span),
             Item::Ambiguous => {
@@ -561,10 +565,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 }
             },
             Thing::Type(ty) => self.enumerator(ty, member),
-            Thing::Library => match self.c.library_names.get(&key(&member.text)).copied() {
+            Thing::Space(space) => match self.c.item_in(space, &member.text) {
                 Some(item) => self.item(item, &member.text, span),
                 None => {
-                    self.report(Code::UnknownMember, member.span, format!("the library has no `{}`", member.text));
+                    let what = if let Item::Library = space { "library" } else { "namespace" };
+                    self.report(Code::UnknownMember, member.span, format!("the {what} has no `{}`", member.text));
                     Thing::Error
                 }
             },
@@ -581,11 +586,14 @@ impl<'c, 'a> Lowering<'c, 'a> {
             return Thing::Error;
         }
         let wanted = key(&member.text);
-        if let Some(thing) = self.member_thing(&operand, &wanted, member.span) {
+        if let Some(thing) = self.member_thing(&operand, &wanted) {
             return thing;
         }
         let Type::Struct(structure) = self.c.types.get(operand.ty) else {
-            return self.no_member(&operand, member);
+            return match self.bit_number(&operand, member) {
+                Some(bit) => Thing::Value(self.part_of(operand, Part::Bit(bit), span)),
+                None => self.no_member(&operand, member),
+            };
         };
         let (kind, found) = (structure.kind, structure.fields.iter().find(|f| key(&f.name) == wanted).cloned());
         let unit = self.c.pou_of_type.get(&operand.ty).copied();
@@ -624,6 +632,16 @@ impl<'c, 'a> Lowering<'c, 'a> {
             value.fixed = Some(BLOCK_OUTPUT);
         }
         Thing::Value(value)
+    }
+
+    /// `flags.READY` with a constant READY: the number of the bit.
+    fn bit_number(&mut self, operand: &Operand, member: &Name) -> Option<u32> {
+        self.scalar(operand.ty).filter(|e| crate::types::is_integer(*e))?;
+        let known = self.local(&key(&member.text)).is_some() || self.c.global_name(&member.text).is_some();
+        match known.then(|| self.name(&member.text, member.span))? {
+            Thing::Value(Operand { kind: Kind::Const(Value::Int(bit)), .. }) => u32::try_from(bit).ok(),
+            _ => None,
+        }
     }
 
     fn no_member(&mut self, operand: &Operand, member: &Name) -> Thing {

@@ -42,6 +42,7 @@ impl<'a> Compiler<'a> {
 
     fn lay_out_global(&mut self, i: usize) {
         let Some(var) = self.globals[i].var.clone() else { return };
+        self.home = self.globals[i].home;
         if let Some(at) = &var.decl.at {
             self.report(Code::NotSupported, at.span, "direct addresses are not supported yet").help =
                 Some("wire the variable to a channel in the [io] section of takt.toml".into());
@@ -56,7 +57,7 @@ impl<'a> Compiler<'a> {
             None => var.name.clone(),
         };
         let bare = self.globals[i].list.is_none_or(|l| !self.lists[l].qualified_only)
-            && matches!(self.names.get(&key(&var.name)), Some(crate::scope::Item::Global(n)) if *n == i);
+            && matches!(self.names.get(&self.entered(&var.name)), Some(crate::scope::Item::Global(n)) if *n == i);
         self.program.globals.push(Global {
             name,
             bare,
@@ -75,7 +76,8 @@ impl<'a> Compiler<'a> {
         let mut late = Vec::new();
         self.fill(var.decl, var.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
         self.write(offset, &bytes);
-        self.late.extend(late.into_iter().map(|late| (pou, Late { offset: offset + late.offset, ..late })));
+        let home = self.home;
+        self.late.extend(late.into_iter().map(|late| (pou, home, Late { offset: offset + late.offset, ..late })));
     }
 
     /// Writes initial bytes; zeros at the end of the image cost nothing.
@@ -89,6 +91,7 @@ impl<'a> Compiler<'a> {
     }
 
     fn lay_out_pou(&mut self, i: usize) {
+        self.home = self.pous[i].home;
         for v in 0..self.pous[i].vars.len() {
             let var = self.pous[i].vars[v].clone();
             if var.kind != VarKind::Stat || var.value.is_some() {
@@ -115,7 +118,8 @@ impl<'a> Compiler<'a> {
             self.write(offset, &bytes);
         }
         let late = self.type_late.get(&ty).cloned().unwrap_or_default();
-        self.late.extend(late.iter().map(|late| (Some(i), Late { offset: offset + late.offset, ..*late })));
+        let home = self.pous[i].home;
+        self.late.extend(late.iter().map(|late| (Some(i), home, Late { offset: offset + late.offset, ..*late })));
         let doc = tree.doc.unwrap_or_default().into();
         self.program.globals.push(Global { name: tree.name.text.clone(), bare: true, ty, offset, constant: false, doc });
         self.note_instances(ty, offset);

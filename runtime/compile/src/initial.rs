@@ -308,12 +308,13 @@ impl<'a> Compiler<'a> {
     /// The body that sets what is not bytes.
     pub(crate) fn initialise(&mut self) {
         let late = std::mem::take(&mut self.late);
-        let Some((_, first)) = late.first() else { return };
+        let Some((.., first)) = late.first() else { return };
         let span = first.span();
         let id = self.reserve("(initial values)", span);
         let mut lowering = Lowering::new(self, id, "(initial values)", None, span);
-        for (pou, late) in late {
+        for (pou, home, late) in late {
             lowering.enter(pou);
+            lowering.c.home = home;
             lowering.set_late(Base::Image, 0, late);
         }
         let body = lowering.finish();

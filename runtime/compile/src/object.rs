@@ -81,33 +81,26 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     /// A method, property or action of an instance.
-    pub(crate) fn member_thing(&mut self, operand: &Operand, wanted: &str, at: Span) -> Option<Thing> {
-        let (of, holder, member) = match self.c.types.get(operand.ty) {
+    pub(crate) fn member_thing(&mut self, operand: &Operand, wanted: &str) -> Option<Thing> {
+        let (of, member) = match self.c.types.get(operand.ty) {
             Type::Interface(_) => {
                 let interface = *self.c.interface_of_type.get(&operand.ty)?;
-                let (holder, member) = self.c.interface_member(interface, wanted)?;
-                (Owner::Interface(interface), Owner::Interface(holder), member)
+                let (_, member) = self.c.interface_member(interface, wanted)?;
+                (Owner::Interface(interface), member)
             }
             _ => {
                 let pou = *self.c.pou_of_type.get(&operand.ty)?;
-                let (holder, member) = self.c.member_of(pou, wanted)?;
-                (Owner::Pou(pou), Owner::Pou(holder), member)
+                let (_, member) = self.c.member_of(pou, wanted)?;
+                (Owner::Pou(pou), member)
             }
         };
-        if let Owner::Pou(holder) = holder {
-            self.check_access(member, holder, at);
-        }
         let program = matches!(of, Owner::Pou(pou) if self.c.pous[pou].tree.kind == PouKind::Program);
         let instance = (!program).then(|| operand.clone());
         Some(Thing::Member(Box::new(Bound { instance, member, of, name: wanted.into() })))
     }
 
-    fn check_access(&mut self, member: Member, holder: usize, at: Span) {
-        let unit = match member {
-            Member::Method(unit) | Member::Action(unit) => Some(unit),
-            Member::Property { get, set } => get.or(set),
-        };
-        let Some(unit) = unit else { return };
+    fn check_access(&mut self, unit: usize, at: Span) {
+        let Some(Owner::Pou(holder)) = self.c.pous[unit].owner else { return };
         let head = self.c.pous[unit].tree;
         let access = if head.kind == PouKind::Action { Access::Public } else { head.modifiers.access };
         let class = self.block();
@@ -144,6 +137,7 @@ impl<'a> Lowering<'_, 'a> {
 
     /// Which body of a member runs, and on what.
     fn bind(&mut self, bound: &Bound, unit: usize, part: Part, span: Span) -> Option<Target> {
+        self.check_access(unit, span);
         let method = method_key(&bound.name, part);
         let Some(instance) = &bound.instance else { return Some(Target::Plain) };
         if let Owner::Interface(_) = bound.of {

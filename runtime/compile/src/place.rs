@@ -300,6 +300,11 @@ impl<'a> Lowering<'_, 'a> {
 
     pub(crate) fn part(&mut self, base: &'a Expr, part: Part, span: Span) -> Operand {
         let operand = self.expr(base);
+        self.part_of(operand, part, span)
+    }
+
+    /// Bits of a number.
+    pub(crate) fn part_of(&mut self, operand: Operand, part: Part, span: Span) -> Operand {
         if operand.is_error() {
             return operand;
         }

@@ -90,6 +90,8 @@ pub(crate) enum Member {
 pub(crate) struct Pou<'a> {
     pub(crate) tree: Head<'a>,
     pub(crate) state: Progress,
+    /// The namespaces around it, if there are any.
+    pub(crate) home: Option<&'a tree::Home>,
     /// Type of instances (FUNCTION_BLOCK, PROGRAM).
     pub(crate) ty: Option<TypeId>,
     /// Result type of a FUNCTION or METHOD.
@@ -117,6 +119,8 @@ pub(crate) struct Pou<'a> {
     pub(crate) implements: Vec<usize>,
     /// Number of the class (see [`takt_ir::Class`]), 0 if its instances need not be found.
     pub(crate) class: u32,
+    /// Members of enumerations that are declared in place.
+    pub(crate) enumerators: HashMap<String, (TypeId, i64)>,
     /// Offsets of VAR_INST in the instance of the owner.
     pub(crate) kept: HashMap<String, (TypeId, u32)>,
 }
@@ -142,6 +146,7 @@ pub(crate) enum Progress {
 #[derive(Debug)]
 pub(crate) struct Declared<'a> {
     pub(crate) tree: &'a tree::TypeDecl,
+    pub(crate) home: Option<&'a tree::Home>,
     pub(crate) state: Progress,
     pub(crate) ty: Option<TypeId>,
 }
@@ -154,6 +159,7 @@ pub(crate) struct GlobalVar<'a> {
     pub(crate) list: Option<usize>,
     pub(crate) decl: &'a tree::VarDecl,
     pub(crate) kind: VarKind,
+    pub(crate) home: Option<&'a tree::Home>,
     pub(crate) constant: bool,
     pub(crate) state: Progress,
 }
@@ -185,4 +191,5 @@ pub(crate) enum Item {
     /// Member of a declared enumeration that may not be resolved yet.
     Member(usize, usize),
     Library,
+    Namespace(usize),
 }

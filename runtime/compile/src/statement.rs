@@ -301,7 +301,7 @@ impl<'a> Lowering<'_, 'a> {
         self.b.release(mark);
     }
 
-    fn condition(&mut self, e: &'a Expr) -> Local {
+    pub(crate) fn condition(&mut self, e: &'a Expr) -> Local {
         let operand = self.expr(e);
         let operand = self.condition_operand(operand);
         self.value(&operand)
@@ -324,6 +324,9 @@ impl<'a> Lowering<'_, 'a> {
 
     fn case_statement(&mut self, value: &'a Expr, arms: &'a [(Vec<CaseLabel>, Vec<Stmt>)], otherwise: Option<&'a [Stmt]>) {
         let selector = self.expr(value);
+        if matches!(self.class(selector.ty), Class::Text | Class::Wide) {
+            return self.case_of_texts(selector, arms, otherwise);
+        }
         let (ty, usable) = match self.class(selector.ty) {
             Class::Int(_) | Class::Char(_) | Class::Bool | Class::Duration(_) => (selector.ty, true),
             _ => (selector.ty, false),
@@ -363,6 +366,37 @@ impl<'a> Lowering<'_, 'a> {
             self.b.end(Term::Jump(end));
         }
         self.b.go_to(default);
+        self.statements(otherwise.unwrap_or_default());
+        self.b.continue_in(end);
+    }
+
+    /// CASE over a string: its labels are texts, compared in order.
+    fn case_of_texts(&mut self, selector: Operand, arms: &'a [(Vec<CaseLabel>, Vec<Stmt>)], otherwise: Option<&'a [Stmt]>) {
+        let end = self.b.block();
+        for (labels, body) in arms {
+            let (then, next) = (self.b.block(), self.b.block());
+            for label in labels {
+                let CaseLabel::Value(e) = label else {
+                    let span = if let CaseLabel::Range(low, high) = label { low.span.to(high.span) } else { selector.span };
+                    self.report(Code::TypeMismatch, span, "a CASE over a string has no ranges");
+                    continue;
+                };
+                let text = self.expr(e);
+                if !text.is_error() && !matches!(text.kind, Kind::Const(_)) {
+                    self.report(Code::NotConstant, e.span, "a CASE label must be a constant");
+                }
+                let hit = self.binary(takt_syntax::tree::BinaryOp::Eq, selector.clone(), text, e.span);
+                let cond = self.value(&hit);
+                let other = self.b.block();
+                self.b.end(Term::Branch { cond, then, other });
+                self.b.go_to(other);
+            }
+            self.b.end(Term::Jump(next));
+            self.b.go_to(then);
+            self.statements(body);
+            self.b.end(Term::Jump(end));
+            self.b.go_to(next);
+        }
         self.statements(otherwise.unwrap_or_default());
         self.b.continue_in(end);
     }

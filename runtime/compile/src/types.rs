@@ -69,7 +69,11 @@ impl<'a> Compiler<'a> {
                     _ => self.error_type(),
                 }
             }
-            TypeExprKind::Enum(body) => self.enum_type(&format!("(enumeration at {})", t.span.start), body, pou),
+            TypeExprKind::Enum(body) => {
+                let ty = self.enum_type(&format!("(enumeration at {})", t.span.start), body, pou);
+                self.declare_enumerators(ty, pou);
+                ty
+            }
             TypeExprKind::Struct(fields) => {
                 let id = self.types.push(Type::Error);
                 self.structure(id, "(structure)", fields, StructKind::Struct, None)
@@ -130,10 +134,7 @@ impl<'a> Compiler<'a> {
                 }
                 self.global_name(&name.text)
             }
-            [library, name] if matches!(self.global_name(&library.text), Some(Item::Library)) => {
-                self.library_names.get(&key(&name.text)).copied()
-            }
-            _ => None,
+            _ => self.path_item(parts.iter().map(|name| name.text.as_str())),
         };
         self.item_type(item, last, span, direct)
     }
@@ -190,7 +191,9 @@ impl<'a> Compiler<'a> {
             }
         }
         self.declared[index].state = Progress::Running;
+        let home = std::mem::replace(&mut self.home, self.declared[index].home);
         let ty = self.define(index, tree);
+        self.home = home;
         self.declared[index].ty = Some(ty);
         self.declared[index].state = Progress::Done;
         ty
@@ -215,6 +218,17 @@ impl<'a> Compiler<'a> {
             }
             TypeKind::Enum(body) => self.enum_type(name, body, None),
             TypeKind::Alias { ty, .. } => self.type_expr(ty, None, true),
+        }
+    }
+
+    /// The members of an enumeration that is declared in place are seen where it stands.
+    fn declare_enumerators(&mut self, ty: TypeId, pou: Option<usize>) {
+        let Type::Enum(e) = self.types.get(ty) else { return };
+        for (name, value) in e.members.clone() {
+            match pou {
+                Some(pou) => drop(self.pous[pou].enumerators.insert(key(&name), (ty, value))),
+                None => self.add_bare(false, &name, Item::Enumerator(ty, value)),
+            }
         }
     }
 
@@ -405,6 +419,7 @@ impl<'a> Compiler<'a> {
             }
             Progress::Untouched => self.pous[index].state = Progress::Running,
         }
+        let home = std::mem::replace(&mut self.home, self.pous[index].home);
         let tree = self.pous[index].tree;
         for other in [self.pous[index].base, self.owner_of(index)].into_iter().flatten() {
             if self.pous[other].state == Progress::Untouched || self.pous[index].base == Some(other) {
@@ -420,6 +435,7 @@ impl<'a> Compiler<'a> {
         if matches!(tree.kind, PouKind::FunctionBlock | PouKind::Program) {
             self.lay_out_instance(index);
         }
+        self.home = home;
         self.pous[index].state = Progress::Done;
     }
 
@@ -560,9 +576,11 @@ impl<'a> Compiler<'a> {
             }
             Progress::Untouched => self.globals[index].state = Progress::Running,
         }
+        let home = std::mem::replace(&mut self.home, self.globals[index].home);
         let ty = self.variable_type(decl, None);
         let constant = self.globals[index].constant;
         let value = if constant && decl.init.is_some() { self.constant_of(decl, ty, None) } else { None };
+        self.home = home;
         self.globals[index].var = Some(Variable {
             name: decl.name.text.clone(),
             kind: self.globals[index].kind,

@@ -49,6 +49,10 @@ pub(crate) struct Compiler<'a> {
     pub(crate) families: Vec<Owner>,
     /// What variables of a type hold at the start and what is not bytes.
     pub(crate) type_late: HashMap<TypeId, std::rc::Rc<Vec<crate::initial::Late<'a>>>>,
+    /// Full names of the namespaces.
+    pub(crate) namespaces: Vec<String>,
+    /// The namespaces around what is being looked at, if there are any.
+    pub(crate) home: Option<&'a tree::Home>,
     /// The program uses `__NEW`.
     pub(crate) heap: bool,
     pub(crate) native_blocks: HashMap<TypeId, &'static takt_abi::BlockDesc>,
@@ -65,7 +69,7 @@ pub(crate) struct Compiler<'a> {
     /// Next free byte of the image.
     pub(crate) next: u64,
     /// Statements that set what cannot be bytes, with the unit whose names they use.
-    pub(crate) late: Vec<(Option<usize>, crate::initial::Late<'a>)>,
+    pub(crate) late: Vec<(Option<usize>, Option<&'a tree::Home>, crate::initial::Late<'a>)>,
 }
 
 impl<'a> Compiler<'a> {
@@ -93,6 +97,8 @@ impl<'a> Compiler<'a> {
             methods: Default::default(),
             families: Vec::new(),
             type_late: HashMap::new(),
+            namespaces: Vec::new(),
+            home: None,
             heap: false,
             native_blocks: HashMap::new(),
             type_init: HashMap::new(),
@@ -112,6 +118,7 @@ impl<'a> Compiler<'a> {
         self.program.files = self.files.iter().map(|f| f.name.clone()).collect();
         self.register_libraries();
         self.collect();
+        self.check_using();
         self.link();
         self.resolve_all();
         self.check_classes();
@@ -205,6 +212,9 @@ impl<'a> Compiler<'a> {
     /// Lowers queued bodies until there is none left.
     pub(crate) fn drain(&mut self) {
         while let Some((id, job)) = self.queue.pop() {
+            self.home = match job {
+                Job::Pou(pou) | Job::Start(pou) => self.pous[pou].home,
+            };
             let body = match job {
                 Job::Pou(pou) => self.lower_body(id, pou),
                 Job::Start(pou) => self.lower_start(id, pou),

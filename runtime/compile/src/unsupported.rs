@@ -1,6 +1,6 @@
 //! What the parser reads and the compiler gives no meaning yet: named and refused, or, where a program runs without it, warned of.
 
-use takt_syntax::tree::{self, Home, Unit, VarBlock, VarKind};
+use takt_syntax::tree::{self, Unit, VarBlock, VarKind};
 use takt_syntax::{Code, Diagnostic, Span};
 
 /// What is to be said of a file.
@@ -9,18 +9,12 @@ pub(crate) fn find(file: &tree::File) -> Vec<Diagnostic> {
     for unit in &file.units {
         match unit {
             Unit::Pou(pou) => {
-                home(&pou.home, &mut found);
                 let methods = pou.methods.iter().flat_map(|method| &method.vars);
                 pou.vars.iter().chain(methods).for_each(|block| section(block, &mut found));
             }
-            Unit::Type(decl) => home(&decl.home, &mut found),
-            Unit::Interface(interface) => home(&interface.home, &mut found),
-            Unit::Globals(globals) => {
-                home(&globals.home, &mut found);
-                section(&globals.vars, &mut found);
-            }
+            Unit::Type(_) | Unit::Interface(_) => {}
+            Unit::Globals(globals) => section(&globals.vars, &mut found),
             Unit::Configuration(configuration) => {
-                home(&configuration.home, &mut found);
                 configuration.globals.iter().for_each(|block| section(block, &mut found));
                 configuration.programs.iter().for_each(|program| connections(program, &mut found));
             }
@@ -33,15 +27,6 @@ fn refuse(found: &mut Vec<Diagnostic>, span: Span, message: &str) {
     found.push(Diagnostic::new(Code::NotSupported, span, message));
 }
 
-fn home(home: &Home, found: &mut Vec<Diagnostic>) {
-    if let Some(name) = home.namespace.first() {
-        refuse(found, name.span, "NAMESPACE is not supported yet");
-    }
-    for name in &home.using {
-        refuse(found, name.span, "USING is not supported yet");
-    }
-}
-
 fn section(block: &VarBlock, found: &mut Vec<Diagnostic>) {
     match block.kind {
         VarKind::Generic => refuse(found, block.span, "VAR_GENERIC is not supported yet"),
@@ -50,9 +35,6 @@ fn section(block: &VarBlock, found: &mut Vec<Diagnostic>) {
             found.push(diagnostic.help("declare the variables with their addresses: `lamp AT %QX0.0 : BOOL;`"));
         }
         _ => {}
-    }
-    for decl in block.vars.iter().filter(|decl| !decl.fb_inits.is_empty()) {
-        refuse(found, decl.name.span, "arguments for the elements of an array of blocks are not supported yet");
     }
 }
 
