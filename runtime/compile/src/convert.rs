@@ -25,6 +25,9 @@ impl Lowering<'_, '_> {
         if let Some(done) = self.object_conversion(&a, to) {
             return done;
         }
+        if let Some(checked) = self.check_range(&a, to) {
+            return self.explicit(checked, to);
+        }
         match (self.class(a.ty), self.class(to)) {
             (Class::Int(from), Class::Int(into)) => self.int_to_int(a, from, into, to),
             (Class::Int(from), Class::Real(into)) => {

@@ -104,6 +104,8 @@ pub(crate) struct Lowering<'c, 'a> {
     pub(crate) protected: Vec<(usize, &'a [takt_syntax::tree::Stmt])>,
     pub(crate) labels: std::collections::HashMap<String, (BlockId, bool, Span)>,
     pub(crate) scratch: bool,
+    /// What is being lowered is about to be written.
+    pub(crate) writes: bool,
 }
 
 impl<'c, 'a> Lowering<'c, 'a> {
@@ -122,6 +124,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
             protected: Vec::new(),
             labels: Default::default(),
             scratch: false,
+            writes: false,
         };
         new.enter(pou);
         new
@@ -142,6 +145,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
             protected: Vec::new(),
             labels: Default::default(),
             scratch: true,
+            writes: false,
         };
         new.enter(pou);
         new
@@ -295,7 +299,12 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 Thing::Value(operand) => self.follow(operand),
                 _ => self.expr(e),
             },
-            _ => self.expr(e),
+            _ => {
+                let before = std::mem::replace(&mut self.writes, true);
+                let target = self.expr(e);
+                self.writes = before;
+                target
+            }
         }
     }
 

@@ -9,6 +9,7 @@
 
 mod body;
 mod call;
+mod checks;
 mod class;
 mod constant;
 mod construct;

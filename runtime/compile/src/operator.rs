@@ -245,6 +245,7 @@ impl<'a> Lowering<'_, 'a> {
             return self.error(span);
         }
         use BinaryOp::*;
+        let b = if op == Div { self.check_divisor(b) } else { b };
         let (a, b) = match (self.class(a.ty), self.class(b.ty)) {
             (Class::Bool, Class::Int(_)) => (a, self.truth(b)),
             (Class::Int(_), Class::Bool) => (self.truth(a), b),

@@ -178,6 +178,7 @@ impl<'a> Lowering<'_, 'a> {
             self.report(Code::NotPointer, span, format!("`^` needs a POINTER, found `{name}`"));
             return self.error(span);
         };
+        let operand = self.check_pointer(operand, to);
         let pointer = self.value(&operand);
         let place = self.deref(pointer, to, span);
         Operand { dynamic: true, ..self.at(place, to, span) }
@@ -253,7 +254,8 @@ impl<'a> Lowering<'_, 'a> {
                 }
                 _ => {
                     let Place::Memory { base, offset } = place else { return self.error(span) };
-                    let index = self.value(value);
+                    let value = self.check_bounds(value.clone(), *low, *high);
+                    let index = self.value(&value);
                     let site = self.site(value.span);
                     let dst = self.b.local(Ty::Addr(stride as u32));
                     self.b.push(Inst::Index { dst, base, offset, index, low: *low, high: *high, stride: stride as u32, site });
