@@ -330,10 +330,10 @@ impl<'a> Lowering<'_, 'a> {
         Operand { exact: true, flex: flex && matches!(operand.kind, Kind::Const(_)) && !is_comparison(op), ..operand }
     }
 
-    /// Whether REAL is enough for both: no LREAL that is not a literal, no 64-bit integer.
+    /// Whether REAL is enough for both: no LREAL that is not a literal within its range, no 64-bit integer.
     fn is_single(&self, a: &Operand, b: &Operand) -> bool {
         let wide = |o: &Operand| match self.class(o.ty) {
-            Class::Real(Elem::Lreal) => !o.flex,
+            Class::Real(Elem::Lreal) => !o.flex || o.exceeds_real(),
             Class::Int(e) => !o.flex && takt_ir::elem_size(e) == 8,
             _ => false,
         };
