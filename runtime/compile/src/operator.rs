@@ -1,5 +1,6 @@
 //! Operators: which types they take, which IR operator they become, folding of constants.
 
+mod order;
 mod time;
 
 use crate::constant::{Value, cut, range};
@@ -180,6 +181,7 @@ impl<'a> Lowering<'_, 'a> {
         if matches!(op, BinaryOp::AndThen | BinaryOp::OrElse) {
             return self.short_circuit(op, left, b, span);
         }
+        let left = self.settled(left, b);
         let right = self.expr(b);
         self.binary(op, left, right, span)
     }
