@@ -37,6 +37,12 @@ impl Lowering<'_, '_> {
                 self.explicit(a, to)
             }
             (Class::Real(_), Class::Real(into)) => {
+                if let (Kind::Const(Value::Real(v)), Elem::Real, true) = (&a.kind, into, a.flex && a.exceeds_real()) {
+                    let v = *v;
+                    self.report(Code::OutOfRange, a.span, format!("{v:?} does not fit `REAL` (up to {:?})", f32::MAX)).help =
+                        Some("use LREAL".into());
+                    return self.error(a.span);
+                }
                 self.maybe_lossy(&a, to, into == Elem::Lreal || a.flex);
                 self.explicit(a, to)
             }

@@ -111,6 +111,8 @@ impl<'a> Lowering<'_, 'a> {
         for (i, arg) in args.iter().enumerate() {
             let Some(value) = &arg.value else { continue };
             let operand = self.expr(value);
+            let later = args[i + 1..].iter().filter_map(|arg| arg.value.as_ref());
+            let operand = later.fold(operand, |operand, next| self.settled(operand, next));
             failed |= operand.is_error();
             let place = match &arg.name {
                 None => i,
