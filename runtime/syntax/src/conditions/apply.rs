@@ -15,6 +15,7 @@ pub(crate) fn apply(lexed: &mut Lexed, file: FileId, text: &str, conditions: &Co
     pass.run(lexed);
     pass.cut(lexed);
     lexed.diagnostics.append(&mut pass.diagnostics);
+    lexed.diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
     pass.suppressed.extend(pass.silenced.drain(..).map(|(code, start)| Suppressed { code, start, end: u32::MAX }));
     pass.suppressed
 }
