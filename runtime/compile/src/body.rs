@@ -343,7 +343,7 @@ impl<'a> Lowering<'_, 'a> {
                 all(otherwise.as_deref().unwrap_or_default(), taken);
             }
             StmtKind::For { from, to, by, body, .. } => {
-                [Some(from), Some(to), by.as_ref()].into_iter().flatten().for_each(|e| self.taken_expr(e, taken));
+                [Some(&**from), Some(&**to), by.as_ref()].into_iter().flatten().for_each(|e| self.taken_expr(e, taken));
                 all(body, taken);
             }
             StmtKind::While { cond, body } | StmtKind::Repeat { body, until: cond } => {

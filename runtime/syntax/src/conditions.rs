@@ -15,6 +15,7 @@ mod facts;
 pub(crate) use apply::apply;
 
 use crate::lexer::{self, Lexed};
+use crate::parser::MAX_TEXT;
 use crate::tree::Suppressed;
 use crate::{FileId, Source};
 use facts::{Facts, key};
@@ -71,7 +72,7 @@ impl Conditions {
     pub fn scan(&mut self, source: &Source) {
         let stem = source.name.rsplit(['/', '\\']).next().unwrap_or("");
         let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
-        if u32::try_from(source.text.len()).is_err() {
+        if source.text.len() > MAX_TEXT {
             return;
         }
         let mut lexed = lexer::lex(FileId(0), &source.text);

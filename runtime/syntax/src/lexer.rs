@@ -42,7 +42,7 @@ pub(crate) struct Lexed {
     pub comments: Vec<Comment>,
     /// Pragmas in order.
     pub pragmas: Vec<PlacedPragma>,
-    /// What was found wrong.
+    /// What was found wrong, in the order of the places.
     pub diagnostics: Vec<Diagnostic>,
     /// There are pragmas that act before the parser.
     pub has_directives: bool,

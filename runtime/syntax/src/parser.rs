@@ -28,6 +28,8 @@ use crate::lexer::{self, Kind, Lexed, MAX_DIAGNOSTICS, Token};
 use crate::tree::{self, Direct, Home, Name, VarBlock};
 use crate::{Code, Diagnostic, FileId, LineIndex, Span};
 
+/// Longest text, in bytes: a million lines. Its tree may need thirty times as much.
+pub(crate) const MAX_TEXT: usize = 32 << 20;
 /// Deepest nesting of brackets and statements.
 const MAX_DEPTH: u32 = 200;
 /// Greatest height of an expression's tree.
@@ -36,8 +38,8 @@ const MAX_HEIGHT: u32 = 200;
 const CHAIN_HEIGHT: u32 = 64;
 
 /// Parses a source file. Never fails: what could not be read is missing or an `Error` node, and has a diagnostic. No expression is higher than 200
-/// nodes, and brackets and statements nest at most 200 deep. At most 1000 diagnostics of the lexer and as many of the parser are kept, in the order
-/// of their places.
+/// nodes, and brackets and statements nest at most 200 deep. At most 1000 diagnostics each of the lexer, of
+/// pragmas and of the parser are kept, in the order of their places.
 ///
 /// Conditional pragmas see the names that this file declares, and no defines but its own; see [`parse_under`].
 pub fn parse(file: FileId, text: &str) -> (tree::File, Vec<Diagnostic>) {
@@ -76,7 +78,8 @@ pub fn parse_expression(file: FileId, text: &str) -> (tree::Expr, Vec<Diagnostic
 }
 
 fn too_large(file: FileId) -> Diagnostic {
-    Diagnostic::new(Code::NotSupported, Span { file, start: 0, end: 0 }, "a source file of 4 GiB or more is not supported")
+    Diagnostic::new(Code::NotSupported, Span { file, start: 0, end: 0 }, "a source file of more than 32 MiB is not supported")
+        .help("divide it into several files")
 }
 
 /// A block that waits for its END_.
@@ -125,7 +128,9 @@ struct Parser<'a> {
 
 impl<'a> Parser<'a> {
     fn open(file: FileId, text: &'a str) -> Option<Self> {
-        u32::try_from(text.len()).ok()?;
+        if text.len() > MAX_TEXT {
+            return None;
+        }
         Some(Self {
             file,
             text,

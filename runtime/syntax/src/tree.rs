@@ -540,7 +540,6 @@ pub enum AssignOp {
 
 /// A statement.
 #[derive(Debug, Clone, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "FOR is wide; a shape that is easy to match is worth more than its bytes")]
 pub enum StmtKind {
     /// `a := b := c;` is targets [a, b], value c.
     Assign {
@@ -570,11 +569,11 @@ pub enum StmtKind {
     /// FOR.
     For {
         /// Control variable.
-        var: Expr,
+        var: Box<Expr>,
         /// Start.
-        from: Expr,
+        from: Box<Expr>,
         /// End.
-        to: Expr,
+        to: Box<Expr>,
         /// BY.
         by: Option<Expr>,
         /// Body.

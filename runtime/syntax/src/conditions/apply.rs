@@ -3,7 +3,7 @@
 use super::Conditions;
 use super::condition::{Fault, holds};
 use super::facts::{Facts, Scanner, View, key};
-use crate::lexer::{Lexed, PlacedPragma, Token, shorten, unquote};
+use crate::lexer::{Lexed, MAX_DIAGNOSTICS, PlacedPragma, Token, shorten, unquote};
 use crate::tree::{Pragma, Suppressed};
 use crate::{Code, Diagnostic, FileId, Span, codes};
 use std::collections::HashMap;
@@ -15,6 +15,7 @@ pub(crate) fn apply(lexed: &mut Lexed, file: FileId, text: &str, conditions: &Co
     pass.run(lexed);
     pass.cut(lexed);
     lexed.diagnostics.append(&mut pass.diagnostics);
+    lexed.diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
     pass.suppressed.extend(pass.silenced.drain(..).map(|(code, start)| Suppressed { code, start, end: u32::MAX }));
     pass.suppressed
 }
@@ -74,6 +75,12 @@ impl<'a> Pass<'a> {
         }
     }
 
+    fn tell(&mut self, diagnostic: Diagnostic) {
+        if self.diagnostics.len() < MAX_DIAGNOSTICS {
+            self.diagnostics.push(diagnostic);
+        }
+    }
+
     fn is_active(&self) -> bool {
         self.frames.last().is_none_or(|frame| frame.is_active)
     }
@@ -98,7 +105,7 @@ impl<'a> Pass<'a> {
         }
         for frame in std::mem::take(&mut self.frames) {
             let message = "this `{IF}` is not closed by `{END_IF}`";
-            self.diagnostics.push(Diagnostic::new(Code::BadPragma, frame.span, message));
+            self.tell(Diagnostic::new(Code::BadPragma, frame.span, message));
         }
     }
 
@@ -161,7 +168,7 @@ impl<'a> Pass<'a> {
         let Some(mut frame) = self.frames.pop() else { return self.homeless(pragma) };
         if frame.has_else {
             let message = format!("`{{{}}}` behind the `{{ELSE}}` of the same `{{IF}}`", pragma.name.to_uppercase());
-            self.diagnostics.push(Diagnostic::new(Code::BadPragma, pragma.span, message));
+            self.tell(Diagnostic::new(Code::BadPragma, pragma.span, message));
         }
         let is_open = frame.is_outer_active && !frame.is_taken;
         frame.is_active = is_open && condition.is_none_or(|condition| self.evaluate(pragma.span, condition));
@@ -178,7 +185,7 @@ impl<'a> Pass<'a> {
 
     fn homeless(&mut self, pragma: &Pragma) {
         let message = format!("`{{{}}}` belongs to no open `{{IF}}`", pragma.name.to_uppercase());
-        self.diagnostics.push(Diagnostic::new(Code::BadPragma, pragma.span, message));
+        self.tell(Diagnostic::new(Code::BadPragma, pragma.span, message));
     }
 
     fn evaluate(&mut self, span: Span, condition: &str) -> bool {
@@ -193,7 +200,7 @@ impl<'a> Pass<'a> {
             Err(Fault { message, help }) => {
                 let mut diagnostic = Diagnostic::new(Code::BadPragma, span, message);
                 diagnostic.help = help.map(str::to_owned);
-                self.diagnostics.push(diagnostic);
+                self.tell(diagnostic);
                 false
             }
         }
@@ -211,12 +218,12 @@ impl<'a> Pass<'a> {
             "undefine" if self.names_something(pragma, rest) => {
                 self.defines.remove(&key(rest));
             }
-            "error" => self.diagnostics.push(Diagnostic::new(Code::ErrorPragma, pragma.span, unquote(rest))),
+            "error" => self.tell(Diagnostic::new(Code::ErrorPragma, pragma.span, unquote(rest))),
             "warning" => {
                 let (word, list) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
                 match word.to_ascii_lowercase().as_str() {
                     "disable" | "restore" => self.silence(pragma, word.eq_ignore_ascii_case("disable"), list),
-                    _ => self.diagnostics.push(Diagnostic::new(Code::WarningPragma, pragma.span, unquote(rest))),
+                    _ => self.tell(Diagnostic::new(Code::WarningPragma, pragma.span, unquote(rest))),
                 }
             }
             _ => {}
@@ -227,7 +234,7 @@ impl<'a> Pass<'a> {
         let is_name = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !is_name {
             let message = format!("expected a name behind `{}`, found `{}`", pragma.name, shorten(name));
-            self.diagnostics.push(Diagnostic::new(Code::BadPragma, pragma.span, message).help("write for example `{define SIMULATION}`"));
+            self.tell(Diagnostic::new(Code::BadPragma, pragma.span, message).help("write for example `{define SIMULATION}`"));
         }
         is_name
     }
@@ -251,11 +258,11 @@ impl<'a> Pass<'a> {
                 }
                 Some(_) => {
                     let message = format!("`{}` is an error and cannot be disabled", shorten(word));
-                    self.diagnostics.push(Diagnostic::new(Code::BadPragma, pragma.span, message));
+                    self.tell(Diagnostic::new(Code::BadPragma, pragma.span, message));
                 }
                 None if is_ours => {
                     let message = format!("there is no warning `{}`", shorten(word));
-                    self.diagnostics.push(Diagnostic::new(Code::BadPragma, pragma.span, message));
+                    self.tell(Diagnostic::new(Code::BadPragma, pragma.span, message));
                 }
                 None => {}
             }

@@ -7,6 +7,11 @@ use crate::lexer::Kind;
 use crate::tree::Name;
 use crate::{Code, Diagnostic};
 
+/// Deepest nesting of namespaces; each unit carries the names of those around it.
+const MAX_NAMESPACES: usize = 30;
+/// Most namespaces that are used in one place, for the same reason.
+const MAX_USING: usize = 100;
+
 impl Parser<'_> {
     /// `NAMESPACE INTERNAL a.b`: what follows, up to END_NAMESPACE, stands in it.
     pub(super) fn enter_namespace(&mut self) {
@@ -18,6 +23,14 @@ impl Parser<'_> {
         }
         loop {
             let name = self.name("the name of the namespace");
+            if self.home.namespace.len() >= MAX_NAMESPACES {
+                let message = format!("namespaces are nested more than {MAX_NAMESPACES} levels deep");
+                self.tell(Diagnostic::new(Code::TooDeep, name.span, message));
+                // What is in it belongs nowhere, and its END_ is no second mistake.
+                self.lexed.truncated = true;
+                self.at = self.lexed.tokens.len() - 1;
+                return;
+            }
             self.home.namespace.push(name);
             if !self.eat(Kind::Dot) {
                 break;
@@ -45,6 +58,19 @@ impl Parser<'_> {
             self.home = home;
             self.close_block();
         }
+    }
+
+    /// `USING a;` outside of a unit.
+    pub(super) fn use_for_all(&mut self) {
+        let place = self.span_of(self.token());
+        let mut names = self.using();
+        let room = MAX_USING.saturating_sub(self.home.using.len());
+        if names.len() > room {
+            let message = format!("more than {MAX_USING} namespaces are used in one place");
+            self.tell(Diagnostic::new(Code::TooDeep, place, message).help("write the names with their namespace: `a.b.f()`"));
+            names.truncate(room);
+        }
+        self.home.using.extend(names);
     }
 
     /// `USING a.b, c;` as often as it stands here.

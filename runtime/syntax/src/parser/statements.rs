@@ -346,6 +346,10 @@ impl Parser<'_> {
         self.bump();
         self.brackets = brackets;
         self.failed = false;
+        if !self.enter() {
+            self.skip_nested();
+            return Some(StmtKind::Error);
+        }
         self.open_block(start, end);
         self.assumed = Some(end);
         let cond = Expr { kind: ExprKind::Error, span: self.span_of(start) };
@@ -358,6 +362,7 @@ impl Parser<'_> {
                 StmtKind::While { cond, body }
             }
         };
+        self.leave();
         self.eat(Kind::Semi);
         Some(kind)
     }
@@ -489,16 +494,16 @@ impl Parser<'_> {
         if self.kind() == Kind::LParen {
             return self.loop_of_c();
         }
-        let var = self.place();
+        let var = Box::new(self.place());
         if self.kind() == Kind::Eq && !self.failed {
             self.slip_equal("the first value of FOR is assigned with `:=`");
             self.bump();
         } else {
             self.expect(Kind::Assign);
         }
-        let from = self.expression();
+        let from = Box::new(self.expression());
         self.expect(Kind::To);
-        let to = self.expression();
+        let to = Box::new(self.expression());
         let by = if self.eat(Kind::By) { Some(self.expression()) } else { None };
         self.head_word(Kind::Do, brackets);
         let body = self.statements();

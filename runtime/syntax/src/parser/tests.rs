@@ -3,6 +3,7 @@
 mod conditions;
 mod dialect;
 mod messages;
+mod replay;
 mod robustness;
 
 use super::*;

@@ -37,10 +37,7 @@ impl Parser<'_> {
             Kind::Class if self.starts_soft_unit() => units.push(Unit::Pou(self.pou(PouKind::FunctionBlock, Kind::EndClass))),
             Kind::Interface if self.starts_soft_unit() => units.push(Unit::Interface(self.interface())),
             Kind::Namespace if self.starts_soft_unit() => self.enter_namespace(),
-            Kind::Using if self.starts_soft_unit() => {
-                let names = self.using();
-                self.home.using.extend(names);
-            }
+            Kind::Using if self.starts_soft_unit() => self.use_for_all(),
             Kind::Method | Kind::Property | Kind::Action if self.starts_member() => self.member_behind(units),
             Kind::EndNamespace => self.leave_namespace(),
             Kind::Semi => {

@@ -183,11 +183,44 @@ fn long_files_of_mistakes_end() {
         ("VAR ", "PROGRAM p "),
         ("TASK t ", "CONFIGURATION c "),
         ("ELSEIF ", "PROGRAM p "),
+        ("NAMESPACE a ", ""),
+        ("USING a; FUNCTION f END_FUNCTION ", ""),
+        ("{IF defined(x)} ", ""),
+        ("{IF defined(x)} {ELSE} {END_IF} ", "PROGRAM p "),
+        ("{error 'e'} ", ""),
+        ("{warning disable W0301} ", ""),
+        ("{define x} ", "PROGRAM p "),
+        ("CASE a OF x ", "PROGRAM p "),
+        ("FOR (", "PROGRAM p "),
+        ("f<", "PROGRAM p VAR a : "),
+        ("END IF ", "PROGRAM p "),
+        ("METHOD f.m END_METHOD ", "FUNCTION_BLOCK f END_FUNCTION_BLOCK "),
+        ("METHOD m ", "INTERFACE i "),
+        ("\0", "PROGRAM p "),
         ("\u{fffd}", ""),
     ] {
         let (_, diagnostics) = parse(FILE, &format!("{head}{}", piece.repeat(N)));
-        assert!(diagnostics.len() <= 2 * MAX_DIAGNOSTICS, "{piece}");
+        assert!(diagnostics.len() <= 3 * MAX_DIAGNOSTICS, "{piece}");
     }
+}
+
+#[test]
+fn heads_of_cases_without_end_do_not_exhaust_the_stack() {
+    on_small_stack(|| {
+        for piece in ["CASE a OF x ", "x THEN ", "x DO ", "NAMESPACE a ", "REPEAT ", "f<", "FOR ("] {
+            parse(FILE, &format!("PROGRAM p {}", piece.repeat(20_000)));
+            parse(FILE, &piece.repeat(20_000));
+        }
+    });
+}
+
+#[test]
+fn a_text_beyond_the_bound_is_refused_at_once() {
+    let text = " ".repeat(MAX_TEXT + 1);
+    check(&text, &["1:1 E0108 a source file of more than 32 MiB is not supported"]);
+    assert_eq!(parse_expression(FILE, &text).1.len(), 1);
+    check(&"// nothing\n".repeat(1_000_000), &[]);
+    clean(&format!("PROGRAM p\n{}END_PROGRAM", "a := b + 1;\n".repeat(200_000)));
 }
 
 /// A program that uses most of the language.
@@ -212,4 +245,19 @@ fn a_token_left_out_or_doubled_is_no_cascade() {
     let share = |counts: &[usize; 6], most: usize| counts[..=most].iter().sum::<usize>() * 100 / edges.len();
     assert!(share(&left_out, 1) >= 95 && share(&left_out, 2) >= 98, "{left_out:?}");
     assert!(share(&replaced, 2) >= 5 * 85, "{replaced:?}");
+}
+
+/// Prints how long a program of 30 000 lines takes. Says something only when built with optimization: `cargo test --release -- --ignored thirty`.
+#[test]
+#[ignore = "a measurement, which asserts nothing"]
+fn thirty_thousand_lines_are_measured() {
+    let text = MACHINE.repeat(340);
+    let best = (0..20).map(|_| {
+        let start = std::time::Instant::now();
+        let tree = parse(FILE, &text);
+        let spent = start.elapsed();
+        drop(tree);
+        spent
+    });
+    eprintln!("{} lines: {:?}", text.lines().count(), best.min());
 }
