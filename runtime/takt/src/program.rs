@@ -90,7 +90,13 @@ fn move_sites(program: &mut Program, sources: &Sources) {
         let Some(source) = sources.list.get(index) else { continue };
         let lines = origin.lines(&source.text);
         for site in program.sites.iter_mut().filter(|site| site.file as usize == index) {
-            (site.line, site.column) = lines.place(site.line, site.column);
+            let Some((file, line, column)) = lines.place(site.line, site.column) else { continue };
+            let known = if file == source.name { Some(index) } else { program.files.iter().position(|name| name == file) };
+            let file = known.unwrap_or_else(|| {
+                program.files.push(file.into());
+                program.files.len() - 1
+            });
+            (site.file, site.line, site.column) = (file as u32, line, column);
         }
     }
 }

@@ -54,7 +54,7 @@ pub fn decode(bytes: Vec<u8>) -> Result<(String, Encoding), NotText> {
         Some((encoding, mark)) => (utf16(&bytes[mark..], encoding)?, encoding),
         None => unmarked(bytes)?,
     };
-    match text.find(|c: char| c.is_ascii_control() && !matches!(c, '\t' | '\n' | '\r' | '\x0C' | '\x1A')) {
+    match text.find(|c: char| c < ' ' && !matches!(c, '\t'..='\r' | '\x1A')) {
         Some(at) => Err(NotText {
             message: format!("expected text, found the control character 0x{:02X}", text.as_bytes()[at]),
             before: text[..at].into(),

@@ -14,6 +14,9 @@ const LONG_LINE: usize = 4096;
 /// Mistakes of a file that are told; more say nothing new.
 const FINDINGS: usize = 100;
 
+/// Things left behind that are listed.
+const LISTED: usize = 1000;
+
 /// What a text is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
@@ -66,6 +69,8 @@ pub(super) struct Writer {
     style: Style,
     origin: Origin,
     index: LineIndex,
+    /// Where the lines of the first file begin.
+    starts: Vec<usize>,
     /// Which file is being read.
     file: usize,
     units: Vec<Unit>,
@@ -84,6 +89,7 @@ impl Writer {
         Self {
             style,
             index: LineIndex::new(&file.text),
+            starts: std::iter::once(0).chain(file.text.match_indices('\n').map(|(at, _)| at + 1)).collect(),
             origin: Origin { files: vec![file], segments: Vec::new() },
             file: 0,
             units: Vec::new(),
@@ -157,7 +163,7 @@ impl Writer {
     /// Blanks up to the column of the file's byte. Lines that no person wrote are left alone.
     fn indent(&mut self, at: usize) {
         let text = &self.origin.files[0].text;
-        let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
+        let start = self.starts[self.line - 1];
         if at - start > LONG_LINE || self.out.len() - self.line_start > LONG_LINE {
             return;
         }
@@ -280,6 +286,11 @@ impl Writer {
 
     /// Says what is left behind.
     pub fn left(&mut self, at: &Range<usize>, what: &str, reason: &str) {
+        let reason = match self.left.len() {
+            LISTED.. => return,
+            count if count == LISTED - 1 => "the list is full: what else is left behind is not told",
+            _ => reason,
+        };
         let file = &self.origin.files[self.file];
         let (line, column) = match self.file {
             0 => self.index.position(&file.text, at.start as u32),

@@ -76,6 +76,8 @@ fn archives_and_giants_are_refused() {
     assert!(said("b.tnzip").contains("ZIP archive"));
     assert!(said("c.st").contains("unpack it") && said("d.TcPOU").contains("unpack it"));
     assert!(said("e").contains("holds no source file"));
+    std::fs::write(root.join("e/g.projectarchive"), "x").unwrap();
+    assert!(said("e").contains("Export PLCopenXML"));
     std::fs::File::create(root.join("big.st")).unwrap().set_len(100 << 20).unwrap();
     assert!(said("big.st").contains("larger than 64 MiB"));
     std::fs::remove_dir_all(root).unwrap();
@@ -178,5 +180,86 @@ fn the_tasks_of_several_files_are_one_configuration() {
     let compiled = crate::program::compile(&project, &[]);
     let spot = compiled.locate(compiled.diagnostics[0].span);
     assert!(spot.file.ends_with("b.TcTTO") && &spot.text[spot.range.clone()] == "Missing", "{spot:?}");
+    std::fs::write(root.join("b.TcTTO"), task("Slow", "10000", "P")).unwrap();
+    let compiled = crate::program::compile(&crate::project::load(&root).unwrap(), &[]);
+    let program = compiled.program.expect("no mistakes");
+    let sites = program.sites.iter().filter(|site| program.files[site.file as usize].ends_with("b.TcTTO"));
+    assert_eq!(sites.map(|site| (site.line, site.column)).collect::<Vec<_>>(), [(3, 13)]);
     std::fs::remove_dir_all(root).unwrap();
+}
+
+/// What is made of a damaged file has places in it, and the parser takes it.
+fn survives(name: &str, text: &str) {
+    for style in [Style::Places, Style::Clean] {
+        let source = Source { name: name.into(), text: text.into() };
+        let written = match name.rsplit_once('.').unwrap().1 {
+            "xml" => write_xml(style, source, "stem", |root, writer| plcopen::write(root, "stem", writer)),
+            "TcTTO" => write_xml(style, source, "stem", |root, writer| {
+                let plans: Vec<_> = tasks::of_twincat(root, 0, writer).into_iter().collect();
+                tasks::write("Tasks", &plans, writer);
+            }),
+            "plcproj" => write_xml(style, source, "stem", |root, writer| drop(plcproj::items(root, writer))),
+            _ => write_xml(style, source, "stem", |root, writer| twincat::write(root, "stem", writer)),
+        };
+        for segment in &written.origin.segments {
+            assert!(text.get(segment.from..segment.to).is_some(), "{name}: {segment:?}");
+        }
+        for unit in &written.units {
+            let (_, found) = takt_syntax::parse(FileId(0), &unit.text);
+            let spans = found.iter().chain(&written.findings).map(|diagnostic| diagnostic.span);
+            for span in spans.filter(|_| style == Style::Places) {
+                let (_, range) = written.origin.place(span.start as usize..span.end as usize);
+                assert!(range.start <= range.end && range.end <= text.len(), "{name}: {range:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_file_damaged_anywhere_does_no_harm() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/import");
+    let files = ["codesys/Blinker.xml", "oop/Drive.xml", "oop/FB_Drive.TcPOU", "twincat/POUs/MAIN.TcPOU", "twincat/GVLs/GVL_Sorter.TcGVL"];
+    let scraps = [
+        "<",
+        ">",
+        "</",
+        "/>",
+        "\"",
+        "'",
+        "=",
+        "&",
+        "&lt;",
+        "<![CDATA[",
+        "]]>",
+        "<!--",
+        "点",
+        "(*",
+        "*)",
+        "//",
+        "\n",
+        "END_VAR",
+        "VAR_GLOBAL ",
+        "{",
+        "}",
+    ];
+    let mut state = 1_u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below.max(1)
+    };
+    for file in files.iter().chain(&["twincat/PlcTask.TcTTO", "twincat/Sorter.plcproj"]) {
+        let (text, _) = decode(std::fs::read(root.join(file)).unwrap()).unwrap();
+        for round in 0..150 {
+            let mut damaged: Vec<char> = text.chars().collect();
+            for _ in 0..=random(3) {
+                let at = random(damaged.len());
+                match round % 3 {
+                    0 => damaged.truncate(at),
+                    1 => drop(damaged.drain(at..(at + 1 + random(40)).min(damaged.len()))),
+                    _ => drop(damaged.splice(at..at, scraps[random(scraps.len())].chars()).collect::<Vec<_>>()),
+                }
+            }
+            survives(file, &damaged.into_iter().collect::<String>());
+        }
+    }
 }

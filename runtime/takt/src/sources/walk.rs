@@ -77,9 +77,9 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<Found>, SourceError> {
             found.push(Found { path: path.clone(), folder: PathBuf::new(), kind: named(path)? });
             continue;
         }
-        let mut walk = Walk { seen: HashSet::new(), files: Vec::new() };
+        let mut walk = Walk { seen: HashSet::new(), files: Vec::new(), packed: None };
         walk.folder(path, Path::new(""), 0)?;
-        found.extend(chosen(path, walk.files)?);
+        found.extend(chosen(path, walk)?);
     }
     let mut seen = HashSet::new();
     found.retain(|file| seen.insert(file.path.canonicalize().unwrap_or_else(|_| file.path.clone())));
@@ -96,19 +96,24 @@ fn named(path: &Path) -> Result<Kind, SourceError> {
 }
 
 /// What counts of a folder.
-fn chosen(path: &Path, files: Vec<Found>) -> Result<Vec<Found>, SourceError> {
-    let mut projects = files.iter().filter(|file| file.kind == Kind::Project);
+fn chosen(path: &Path, walk: Walk) -> Result<Vec<Found>, SourceError> {
+    let mut projects = walk.files.iter().filter(|file| file.kind == Kind::Project);
     match (projects.next(), projects.next()) {
         (Some(first), Some(second)) => Err(SourceError::TwoProjects(first.path.clone(), second.path.clone())),
         (Some(project), None) => Ok(vec![project.clone()]),
-        (None, _) if files.is_empty() => Err(SourceError::Empty(path.into())),
-        (None, _) => Ok(files),
+        (None, _) if walk.files.is_empty() => Err(match walk.packed {
+            Some((path, help)) => SourceError::Packed(path, help),
+            None => SourceError::Empty(path.into()),
+        }),
+        (None, _) => Ok(walk.files),
     }
 }
 
 struct Walk {
     seen: HashSet<PathBuf>,
     files: Vec<Found>,
+    /// An archive, told where nothing else is found.
+    packed: Option<(PathBuf, &'static str)>,
 }
 
 impl Walk {
@@ -135,6 +140,8 @@ impl Walk {
                     return Err(SourceError::TooMany(folder.into(), FILES));
                 }
                 self.files.push(Found { path, folder: relative.into(), kind });
+            } else if let Some(help) = packed(&path) {
+                self.packed.get_or_insert((path, help));
             }
         }
         Ok(())

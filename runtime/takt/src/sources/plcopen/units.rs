@@ -35,8 +35,10 @@ pub(super) fn unit(pou: &Element<'_>, name: &str, writer: &mut Writer) {
 
 /// Copies the declaration that CODESYS gives as plain text, if there is one, and returns its first word.
 fn declared(element: &Element<'_>, writer: &mut Writer) -> Option<String> {
-    let inner = element.child("interface").and_then(|interface| data(interface, "interfaceasplaintext"));
-    let pieces = data(element, "interfaceasplaintext").or(inner)?.pieces();
+    let inner = || element.child("interface").and_then(|interface| data(interface, "interfaceasplaintext"));
+    // TwinCAT leaves the wrapping out in members.
+    let bare = || element.child("InterfaceAsPlainText");
+    let pieces = data(element, "interfaceasplaintext").or_else(inner).or_else(bare)?.pieces();
     let text: String = pieces.iter().map(|piece| piece.text.as_ref()).collect();
     let word = words(&text).next()?.1.to_string();
     writer.copy_lines(&pieces);
