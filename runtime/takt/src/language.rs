@@ -44,6 +44,7 @@ words! {
     Errors "errors" "个错误",
     Warnings "warnings" "个警告",
     NoFindings "no findings" "没有发现问题",
+    MoreFindings "more are not shown; correct these first, or ask for --format json" "个未显示;请先改正以上问题,或使用 --format json",
     Help "help" "帮助",
     Cycles "Scans" "扫描周期",
     MachineTime "Machine time" "机器时间",

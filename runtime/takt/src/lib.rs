@@ -12,6 +12,7 @@ pub mod language;
 pub mod machine;
 pub mod manifest;
 pub mod messages;
+pub mod places;
 pub mod platform;
 pub mod plot;
 pub mod program;

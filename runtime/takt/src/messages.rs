@@ -3,6 +3,7 @@
 //! Columns are counted in characters; the drawing knows that some are wide.
 
 use crate::manifest::{ManifestErrors, Place};
+use crate::places::Places;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use serde_json::{Value, json};
 use std::ops::Range;
@@ -17,6 +18,8 @@ pub struct Spot<'a> {
     pub text: &'a str,
     /// Bytes.
     pub range: Range<usize>,
+    /// The lines of the text, where they were counted before.
+    pub places: Option<&'a Places>,
 }
 
 impl<'a> Spot<'a> {
@@ -30,7 +33,29 @@ impl<'a> Spot<'a> {
             byte
         };
         let start = floor(range.start);
-        Self { file, text, range: start..floor(range.end).max(start) }
+        Self { file, text, range: start..floor(range.end).max(start), places: None }
+    }
+
+    /// With the lines of the text, so that they need not be counted again.
+    pub fn with(self, places: Option<&'a Places>) -> Self {
+        Self { places, ..self }
+    }
+
+    /// The lines that are drawn and the number of the first: all, if nobody counted them. The end of the file is drawn behind its last line.
+    fn lines(&self) -> (Range<usize>, u32) {
+        let Some(places) = self.places else { return (0..self.text.len(), 1) };
+        if self.range.start < self.text.len() || !self.text.ends_with('\n') {
+            return places.lines(self.text, &self.range);
+        }
+        let (last, number) = places.lines(self.text, &(self.range.start - 1..self.range.start - 1));
+        (last.start..self.text.len(), number)
+    }
+
+    /// Line and column of a byte.
+    fn place(&self, byte: usize) -> Place {
+        let Some(places) = self.places else { return Place::of(self.text, byte) };
+        let (line, column) = places.position(self.text, byte);
+        Place { line: line as usize, column: column as usize }
     }
 }
 
@@ -38,11 +63,13 @@ impl<'a> Spot<'a> {
 pub type Locate<'a, 'f> = &'f dyn Fn(Span) -> Spot<'a>;
 
 fn snippet<'a>(spot: &Spot<'a>, kind: AnnotationKind, label: Option<&'a str>) -> Snippet<'a, annotate_snippets::Annotation<'a>> {
-    let mut annotation = kind.span(spot.range.clone());
+    let (lines, first) = spot.lines();
+    let start = spot.range.start.min(lines.end);
+    let mut annotation = kind.span(start - lines.start..spot.range.end.clamp(start, lines.end) - lines.start);
     if let Some(label) = label {
         annotation = annotation.label(label);
     }
-    Snippet::source(spot.text).path(spot.file).annotation(annotation)
+    Snippet::source(&spot.text[lines]).line_start(first as usize).path(spot.file).annotation(annotation)
 }
 
 /// Draws a diagnostic. Colours are in it; the stream takes them out where they are not wanted.
@@ -72,7 +99,7 @@ pub fn to_json(diagnostic: &Diagnostic, locate: Locate<'_, '_>) -> Value {
 }
 
 fn place_json(code: &str, severity: &str, message: &str, spot: &Spot<'_>, help: Option<&str>) -> Value {
-    let (start, end) = (Place::of(spot.text, spot.range.start), Place::of(spot.text, spot.range.end));
+    let (start, end) = (spot.place(spot.range.start), spot.place(spot.range.end));
     json!({
         "code": code, "severity": severity, "message": message, "file": spot.file,
         "line": start.line, "column": start.column, "end_line": end.line, "end_column": end.column, "help": help,
@@ -134,6 +161,19 @@ mod tests {
         let at = lines[source].find("'Bar'").unwrap();
         assert_eq!(lines[source + 1].find('^'), Some(cells(&lines[source][..at])), "{plain}");
         assert!(plain.contains("error[E0301]") && plain.contains("a.st:2:7") && plain.contains("help: write a number"), "{plain}");
+    }
+
+    #[test]
+    fn lines_counted_before_change_nothing() {
+        let places = Places::new(TEXT);
+        for range in [0..7, 13..24, 20..20, 13..TEXT.len(), TEXT.len()..TEXT.len(), 8..30] {
+            let span = Span { file: FileId(0), start: range.start as u32, end: range.end as u32 };
+            let diagnostic = Diagnostic::new(Code::TypeMismatch, span, "expected `INT`").note(diagnostic().span, "here");
+            let plain = |span: Span| Spot::new("a.st", TEXT, span.start as usize..span.end as usize);
+            let counted = |span: Span| plain(span).with(Some(&places));
+            assert_eq!(draw(&diagnostic, &counted), draw(&diagnostic, &plain), "{range:?}");
+            assert_eq!(to_json(&diagnostic, &counted), to_json(&diagnostic, &plain), "{range:?}");
+        }
     }
 
     #[test]

@@ -2,11 +2,12 @@
 
 use crate::manifest::{Arithmetic, Located};
 use crate::messages::Spot;
+use crate::places::Places;
 use crate::project::Project;
 use crate::sources::{Origin, Sources};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use takt_abi::Library;
 use takt_ir::{BodyId, Program};
 use takt_syntax::{Diagnostic, Severity, Source, Span};
@@ -40,6 +41,8 @@ pub struct Compiled {
     /// A body per condition, in order.
     pub conditions: Vec<BodyId>,
     files: Vec<Source>,
+    /// Lines of the files, once they were asked for.
+    places: Vec<OnceLock<Places>>,
     first_condition: usize,
     spans: Vec<Option<Range<usize>>>,
     manifest: Option<(String, String)>,
@@ -76,6 +79,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
         program: output.program.map(Arc::new),
         diagnostics: output.diagnostics,
         conditions: output.conditions,
+        places: vec![OnceLock::new(); output.files.len()],
         files: output.files,
         first_condition: project.sources.list.len(),
         spans: conditions.iter().map(|condition| condition.span.clone()).collect(),
@@ -126,10 +130,13 @@ impl Compiled {
         }
         if let Some(origin) = self.origins.get(&index) {
             let (file, range) = origin.place(range);
-            return Spot::new(&file.name, &file.text, range);
+            return Spot::new(&file.name, &file.text, range).with(origin.places(file));
         }
         match self.files.get(index) {
-            Some(file) => Spot::new(&file.name, &file.text, range),
+            Some(file) => {
+                let places = self.places.get(index).map(|places| places.get_or_init(|| Places::new(&file.text)));
+                Spot::new(&file.name, &file.text, range).with(places)
+            }
             None => Spot::new("?", "", 0..0),
         }
     }

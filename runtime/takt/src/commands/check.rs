@@ -51,10 +51,16 @@ fn bound(project: &Project, format: Format) -> Exit {
     }
 }
 
-/// Draws every diagnostic on standard error.
+/// Diagnostics that people are shown; tools get all of them.
+const SHOWN: usize = 500;
+
+/// Draws the diagnostics on standard error.
 pub(super) fn tell(compiled: &Compiled) {
-    for diagnostic in &compiled.diagnostics {
+    for diagnostic in compiled.diagnostics.iter().take(SHOWN) {
         console::tell(format_args!("{}\n", messages::draw(diagnostic, &|span| compiled.locate(span))));
+    }
+    if let more @ 1.. = compiled.diagnostics.len().saturating_sub(SHOWN) {
+        console::tell(format_args!("{more} {}\n", Word::MoreFindings.text(language::of_environment())));
     }
 }
 

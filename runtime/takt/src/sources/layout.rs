@@ -90,7 +90,7 @@ impl Writer {
             style,
             index: LineIndex::new(&file.text),
             starts: std::iter::once(0).chain(file.text.match_indices('\n').map(|(at, _)| at + 1)).collect(),
-            origin: Origin { files: vec![file], segments: Vec::new() },
+            origin: Origin::new(file),
             file: 0,
             units: Vec::new(),
             out: String::new(),

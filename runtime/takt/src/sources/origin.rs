@@ -2,7 +2,9 @@
 //!
 //! The parser reads ST; people edit the file that they exported. A message about the ST is shown at its place in that file.
 
+use crate::places::Places;
 use std::ops::Range;
+use std::sync::OnceLock;
 use takt_syntax::Source;
 
 /// A stretch of the made text and what it stands for.
@@ -32,6 +34,8 @@ impl Segment {
 pub struct Origin {
     /// At least one.
     pub(super) files: Vec<Source>,
+    /// Lines of the first file, once they were asked for.
+    places: OnceLock<Places>,
     /// In the order of the made text.
     pub(super) segments: Vec<Segment>,
 }
@@ -55,6 +59,16 @@ impl Origin {
         };
         let is_forward = last.file == first.file && end >= start && range.end > range.start;
         (&self.files[first.file], start..if is_forward { end } else { start })
+    }
+
+    /// For files of this text.
+    pub(super) fn new(file: Source) -> Self {
+        Self { files: vec![file], segments: Vec::new(), places: OnceLock::new() }
+    }
+
+    /// Lines of a file that [`Origin::place`] returned, if it is the first one: the others are small.
+    pub fn places(&self, file: &Source) -> Option<&Places> {
+        std::ptr::eq(file, self.files.first()?).then(|| self.places.get_or_init(|| Places::new(&file.text)))
     }
 
     /// Ready to answer for lines and columns of the made text.
@@ -88,60 +102,5 @@ impl Lines<'_> {
         let (file, range) = self.origin.place(start + inside..start + inside);
         let (line, column) = self.files[segment.file].position(&file.text, range.start);
         Some((&file.name, line, column))
-    }
-}
-
-/// Bytes between two counts of characters.
-const BLOCK: usize = 4096;
-
-/// Lines and columns of a text, in no time for lines of any length: exports may be one line.
-#[derive(Debug)]
-struct Places {
-    starts: Vec<usize>,
-    /// Characters in front of each block.
-    counts: Vec<usize>,
-}
-
-impl Places {
-    fn new(text: &str) -> Self {
-        let mut counts = vec![0];
-        for block in text.as_bytes().chunks(BLOCK) {
-            counts.push(counts[counts.len() - 1] + characters(block));
-        }
-        Self { starts: std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect(), counts }
-    }
-
-    /// Characters in front of a byte.
-    fn characters(&self, text: &str, at: usize) -> usize {
-        let at = at.min(text.len());
-        self.counts[at / BLOCK] + characters(&text.as_bytes()[at - at % BLOCK..at])
-    }
-
-    /// Line, and column in characters, from 1.
-    fn position(&self, text: &str, at: usize) -> (u32, u32) {
-        let line = self.starts.partition_point(|start| *start <= at);
-        let column = self.characters(text, at) - self.characters(text, self.starts[line - 1]) + 1;
-        (line as u32, column as u32)
-    }
-}
-
-/// Bytes that begin a character.
-fn characters(bytes: &[u8]) -> usize {
-    bytes.iter().filter(|byte| (**byte as i8) >= -0x40).count()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_agree_with_the_index_of_lines() {
-        let text: String = (0..3000).map(|i| if i % 700 == 699 { "点\n" } else { "点a ä" }).collect();
-        let (places, index) = (Places::new(&text), takt_syntax::LineIndex::new(&text));
-        for (at, _) in text.char_indices().step_by(7) {
-            assert_eq!(places.position(&text, at), index.position(&text, at as u32), "{at}");
-        }
-        assert_eq!(places.position(&text, text.len()), index.position(&text, text.len() as u32));
-        assert_eq!(Places::new("").position("", 0), (1, 1));
     }
 }
