@@ -4,7 +4,7 @@
 
 use crate::manifest::{ManifestErrors, Place};
 use crate::places::Places;
-use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use annotate_snippets::{AnnotationKind, Element, Group, Level, Origin, Renderer, Snippet};
 use serde_json::{Value, json};
 use std::ops::Range;
 use takt_syntax::{Diagnostic, Severity, Span};
@@ -62,14 +62,22 @@ impl<'a> Spot<'a> {
 /// Where a span of the compiler is shown.
 pub type Locate<'a, 'f> = &'f dyn Fn(Span) -> Spot<'a>;
 
-fn snippet<'a>(spot: &Spot<'a>, kind: AnnotationKind, label: Option<&'a str>) -> Snippet<'a, annotate_snippets::Annotation<'a>> {
+/// A line longer than this is named, not drawn: no person wrote it.
+const DRAWN: usize = 1 << 16;
+
+fn snippet<'a>(spot: &Spot<'a>, kind: AnnotationKind, label: Option<&'a str>) -> Vec<Element<'a>> {
     let (lines, first) = spot.lines();
+    if spot.places.is_some() && lines.len() > DRAWN {
+        let Place { line, column } = spot.place(spot.range.start);
+        let origin = Origin::path(spot.file).line(line).char_column(column);
+        return std::iter::once(origin.into()).chain(label.map(|label| Level::NOTE.message(label).into())).collect();
+    }
     let start = spot.range.start.min(lines.end);
     let mut annotation = kind.span(start - lines.start..spot.range.end.clamp(start, lines.end) - lines.start);
     if let Some(label) = label {
         annotation = annotation.label(label);
     }
-    Snippet::source(&spot.text[lines]).line_start(first as usize).path(spot.file).annotation(annotation)
+    vec![Snippet::source(&spot.text[lines]).line_start(first as usize).path(spot.file).annotation(annotation).into()]
 }
 
 /// Draws a diagnostic. Colours are in it; the stream takes them out where they are not wanted.
@@ -79,9 +87,9 @@ pub fn draw(diagnostic: &Diagnostic, locate: Locate<'_, '_>) -> String {
         Severity::Warning => Level::WARNING,
     };
     let title = level.primary_title(diagnostic.message.as_str()).id(diagnostic.code.text());
-    let mut group = title.element(snippet(&locate(diagnostic.span), AnnotationKind::Primary, None));
+    let mut group = title.elements(snippet(&locate(diagnostic.span), AnnotationKind::Primary, None));
     for note in &diagnostic.notes {
-        group = group.element(snippet(&locate(note.span), AnnotationKind::Context, Some(note.message.as_str())));
+        group = group.elements(snippet(&locate(note.span), AnnotationKind::Context, Some(note.message.as_str())));
     }
     if let Some(help) = &diagnostic.help {
         group = group.element(Level::HELP.message(help.as_str()));
@@ -115,7 +123,7 @@ pub fn draw_manifest(errors: &ManifestErrors) -> String {
 
 fn manifest_group<'a>(errors: &'a ManifestErrors, error: &'a crate::manifest::ManifestError) -> Group<'a> {
     let spot = Spot::new(&errors.file, &errors.text, error.span.clone());
-    let group = Level::ERROR.primary_title(error.message.as_str()).element(snippet(&spot, AnnotationKind::Primary, None));
+    let group = Level::ERROR.primary_title(error.message.as_str()).elements(snippet(&spot, AnnotationKind::Primary, None));
     if error.help.is_empty() { group } else { group.element(Level::HELP.message(error.help.as_str())) }
 }
 
@@ -174,6 +182,19 @@ mod tests {
             assert_eq!(draw(&diagnostic, &counted), draw(&diagnostic, &plain), "{range:?}");
             assert_eq!(to_json(&diagnostic, &counted), to_json(&diagnostic, &plain), "{range:?}");
         }
+    }
+
+    #[test]
+    fn a_line_that_nobody_wrote_is_named_and_not_drawn() {
+        let text = format!("{TEXT}{}x", "点".repeat(DRAWN));
+        let places = Places::new(&text);
+        let start = text.len() as u32 - 1;
+        let span = Span { file: FileId(0), start, end: start + 1 };
+        let diagnostic = Diagnostic::new(Code::TypeMismatch, span, "expected `INT`").note(span, "declared here").help("write a number");
+        let drawn = draw(&diagnostic, &|span| Spot::new("a.st", &text, span.start as usize..span.end as usize).with(Some(&places)));
+        let plain = anstream::adapter::strip_str(&drawn).to_string();
+        assert!(plain.contains("a.st:4:65537") && plain.contains("declared here") && plain.contains("write a number"), "{plain}");
+        assert!(plain.len() < 1000, "{plain}");
     }
 
     #[test]
