@@ -25,6 +25,9 @@ impl Lowering<'_, '_> {
         if let Some(done) = self.object_conversion(&a, to) {
             return done;
         }
+        if self.c.strict_enums.contains(&to) {
+            return self.mismatch(a, to);
+        }
         if let Some(checked) = self.check_range(&a, to) {
             return self.explicit(checked, to);
         }

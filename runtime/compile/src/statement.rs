@@ -237,6 +237,10 @@ impl<'a> Lowering<'_, 'a> {
                     self.assign_text(place, ty, &value, span);
                 }
             }
+            (Class::Other, Kind::Place(Place::Memory { .. })) if value.ty == ty && self.is_unassignable(ty) => {
+                let name = self.type_name(ty);
+                self.report(Code::NotAssignable, span, format!("instances of `{name}` cannot be assigned: it says `no_assign`"));
+            }
             (Class::Other, Kind::Place(Place::Memory { base, offset })) if value.ty == ty => {
                 let Place::Memory { base: dst, offset: dst_offset } = place else { return };
                 let (src, src_offset, len) = (*base, *offset, self.c.types.size(ty));
@@ -274,6 +278,16 @@ impl<'a> Lowering<'_, 'a> {
         self.b.push(Inst::IsA { dst: found, pointer, family });
         let word = self.b.op(Op::Select, &[found, pointer, zero], site);
         self.store(&target, place.ty, word, true, span);
+    }
+
+    /// `{attribute 'no_assign'}` of a block, or of a block inside.
+    fn is_unassignable(&self, ty: TypeId) -> bool {
+        let says = |pou: &usize| self.c.bases(*pou).any(|b| self.c.pous[b].tree.pragmas.iter().any(|p| p.name == "no_assign"));
+        match self.c.types.get(ty) {
+            Type::Array { elem, .. } => self.is_unassignable(*elem),
+            Type::Struct(_) => self.c.pou_of_type.get(&ty).is_some_and(says),
+            _ => false,
+        }
     }
 
     /// Binds a local REFERENCE where it is declared.

@@ -1,11 +1,12 @@
 //! Tasks: from CONFIGURATION, or the one that is meant without it.
 
 use crate::constant::Value;
-use crate::emit::Builder;
+use crate::expression::Lowering;
 use crate::initial::Known;
+use crate::place::Place;
 use crate::scope::{Item, PouKind, key};
 use crate::unit::Compiler;
-use takt_ir::{BodyId, Inst, Task, Term, Trigger};
+use takt_ir::{Base, BodyId, Task, Term, Trigger};
 use takt_syntax::tree::{self, Unit};
 use takt_syntax::{Code, FileId, Span};
 
@@ -70,7 +71,7 @@ impl<'a> Compiler<'a> {
             return Vec::new();
         };
         let span = self.pous[program].tree.name.span;
-        let entry = self.entry("MainTask", &[program], span);
+        let entry = self.entry("MainTask", &[(program, &[])], span);
         vec![Planned { name: "MainTask".into(), trigger: Trigger::Cyclic(DEFAULT_PERIOD), priority: 1, entry, span }]
     }
 
@@ -105,12 +106,13 @@ impl<'a> Compiler<'a> {
         tasks
     }
 
-    fn programs_of(&mut self, configuration: &'a tree::Configuration, task: &tree::Name) -> Vec<usize> {
+    /// The programs of a task with their connections.
+    fn programs_of(&mut self, configuration: &'a tree::Configuration, task: &tree::Name) -> Vec<(usize, &'a [tree::Arg])> {
         let mut programs = Vec::new();
         for program in configuration.programs.iter().filter(|p| p.task.as_ref().is_some_and(|t| key(&t.text) == key(&task.text))) {
             match self.global_name(&program.ty.text) {
                 Some(Item::Pou(i)) if self.pous[i].tree.kind == PouKind::Program => {
-                    programs.push(i);
+                    programs.push((i, program.connections.as_slice()));
                     self.second_name(&program.name, i);
                 }
                 _ => {
@@ -196,21 +198,20 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn entry(&mut self, name: &str, programs: &[usize], span: Span) -> BodyId {
+    /// The body that calls the programs of a task.
+    fn entry(&mut self, name: &str, programs: &[(usize, &'a [tree::Arg])], span: Span) -> BodyId {
         let id = self.reserve(name, span);
-        let site = self.sites.at(self.files, span, id);
-        let mut b = Builder::new(name, site);
-        for program in programs {
-            let body = self.body_of(*program);
-            let span = self.pous[*program].tree.name.span;
-            let in_outs = self.pous[*program].tree.vars.iter().any(|v| v.kind == tree::VarKind::InOut && !v.vars.is_empty());
-            if in_outs {
-                self.report(Code::BadTask, span, "a PROGRAM that a task calls has no VAR_IN_OUT");
-            }
-            b.push(Inst::Call { body, args: Vec::new(), dst: None, site });
+        let mut lowering = Lowering::new(self, id, name, None, span);
+        for (program, connections) in programs {
+            let ty = lowering.c.pou_type(*program);
+            let offset = lowering.c.pous[*program].instance.max(takt_ir::NULL_ZONE);
+            let at = lowering.c.pous[*program].tree.name.span;
+            let instance = lowering.at(Place::Memory { base: Base::Image, offset }, ty, at);
+            lowering.call_instance(instance, connections, span);
         }
-        b.end(Term::Return(None));
-        self.program.bodies[id.0 as usize] = b.finish();
+        lowering.b.end(Term::Return(None));
+        let body = lowering.finish();
+        self.program.bodies[id.0 as usize] = body;
         id
     }
 

@@ -76,7 +76,7 @@ impl<'a> Compiler<'a> {
             }
             TypeExprKind::Struct(fields) => {
                 let id = self.types.push(Type::Error);
-                self.structure(id, "(structure)", fields, StructKind::Struct, None)
+                self.structure(id, "(structure)", fields, StructKind::Struct, None, None)
             }
             TypeExprKind::Generic { .. } => {
                 self.report(Code::NotSupported, t.span, "a block with VAR_GENERIC constants is not supported yet");
@@ -210,13 +210,19 @@ impl<'a> Compiler<'a> {
             TypeKind::Struct { extends, fields } => {
                 let id = self.declared[index].ty.expect("given before");
                 let base = extends.as_ref().and_then(|base| self.base_structure(id, base));
-                self.structure(id, name, fields, StructKind::Struct, base)
+                self.structure(id, name, fields, StructKind::Struct, base, self.pack_mode(&tree.pragmas))
             }
             TypeKind::Union { fields } => {
                 let id = self.declared[index].ty.expect("given before");
-                self.structure(id, name, fields, StructKind::Union, None)
+                self.structure(id, name, fields, StructKind::Union, None, self.pack_mode(&tree.pragmas))
             }
-            TypeKind::Enum(body) => self.enum_type(name, body, None),
+            TypeKind::Enum(body) => {
+                let ty = self.enum_type(name, body, None);
+                if tree.pragmas.iter().any(|p| p.name == "strict") {
+                    self.strict_enums.insert(ty);
+                }
+                ty
+            }
             TypeKind::Alias { ty, .. } => self.type_expr(ty, None, true),
         }
     }
@@ -316,7 +322,21 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn structure(&mut self, id: TypeId, name: &str, decls: &'a [tree::VarDecl], kind: StructKind, base: Option<TypeId>) -> TypeId {
+    /// `{attribute 'pack_mode' := '1'}`: the largest alignment of a member.
+    fn pack_mode(&self, pragmas: &[tree::Pragma]) -> Option<u32> {
+        let value = pragmas.iter().find(|p| p.name == "pack_mode")?.value.as_deref()?;
+        value.trim().parse().ok().filter(|bytes: &u32| bytes.is_power_of_two())
+    }
+
+    fn structure(
+        &mut self,
+        id: TypeId,
+        name: &str,
+        decls: &'a [tree::VarDecl],
+        kind: StructKind,
+        base: Option<TypeId>,
+        pack: Option<u32>,
+    ) -> TypeId {
         let (mut layout, mut fields) = self.inherited(base);
         for decl in decls {
             let ty = self.variable_type(decl, None);
@@ -324,6 +344,8 @@ impl<'a> Compiler<'a> {
                 self.report(Code::DuplicateName, decl.name.span, format!("`{}` is declared twice in `{name}`", decl.name.text));
             }
             let (size, align) = self.types.layout(ty);
+            // Instances of classes are found at multiples of their granule only.
+            let align = pack.filter(|_| u64::from(align) < takt_abi::GRANULE).map_or(align, |pack| align.min(pack));
             let offset = if kind == StructKind::Union { layout.overlay(size, align) } else { layout.add(size, align) };
             fields.push(Field {
                 name: decl.name.text.clone(),

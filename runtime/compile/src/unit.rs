@@ -60,6 +60,8 @@ pub(crate) struct Compiler<'a> {
     pub(crate) type_init: HashMap<TypeId, std::rc::Rc<Vec<u8>>>,
     /// Initial values of aliases and enumerations.
     pub(crate) pou_of_type: HashMap<TypeId, usize>,
+    /// Enumerations with `{attribute 'strict'}`.
+    pub(crate) strict_enums: std::collections::HashSet<TypeId>,
     /// STRUCT EXTENDS.
     pub(crate) struct_bases: HashMap<TypeId, TypeId>,
     pub(crate) program: Program,
@@ -103,6 +105,7 @@ impl<'a> Compiler<'a> {
             native_blocks: HashMap::new(),
             type_init: HashMap::new(),
             pou_of_type: HashMap::new(),
+            strict_enums: Default::default(),
             struct_bases: HashMap::new(),
             program: Program::default(),
             natives: HashMap::new(),

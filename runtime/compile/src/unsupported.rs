@@ -39,10 +39,8 @@ fn section(block: &VarBlock, found: &mut Vec<Diagnostic>) {
 }
 
 fn connections(program: &tree::ProgramDecl, found: &mut Vec<Diagnostic>) {
-    let connection = program.connections.first().map(|arg| arg.span);
-    let block = program.blocks.first().map(|(block, _)| block.span);
-    if let Some(span) = connection.or(block) {
-        let diagnostic = Diagnostic::new(Code::NotSupported, span, "connections of a program instance are not supported yet");
-        found.push(diagnostic.help("read and write its variables in a program: `p.x := GVL.y;`"));
+    if let Some((block, _)) = program.blocks.first() {
+        let diagnostic = Diagnostic::new(Code::NotSupported, block.span, "a block in a task of its own is not supported yet");
+        found.push(diagnostic.help("call it in a program of that task"));
     }
 }
