@@ -8,6 +8,7 @@
 
 mod expression;
 mod literal;
+mod object;
 mod place;
 mod random;
 mod shape;
@@ -51,6 +52,8 @@ struct Generator {
     blocks: Vec<Signature>,
     functions: Vec<Signature>,
     globals: Vec<Variable>,
+    /// An interface and the blocks that implement it.
+    objects: Option<object::Objects>,
     /// What can be named here.
     scope: Vec<Variable>,
     /// Loop counters that no loop around this place uses.
@@ -75,6 +78,7 @@ impl Default for Generator {
             blocks: unit::standard_blocks(),
             functions: Vec::new(),
             globals: Vec::new(),
+            objects: None,
             scope: Vec::new(),
             counters: Vec::new(),
             loops: 0,
@@ -107,6 +111,9 @@ impl Generator {
         }
         for i in 0..self.random.below(3) {
             self.block(&format!("fb{i}"));
+        }
+        if self.random.chance(50) {
+            self.hierarchy();
         }
         self.main();
     }

@@ -39,6 +39,8 @@ impl Generator {
             }
             26 => self.open_array_call(),
             27 | 28 if self.wild => self.pointer_statement(0),
+            29 if depth > 0 => self.try_statement(depth - 1),
+            30..=33 if self.object_statement() => {}
             _ => self.assignment(),
         }
     }
@@ -67,7 +69,7 @@ impl Generator {
         self.line("END_IF");
     }
 
-    fn some(&mut self, depth: usize) {
+    pub(super) fn some(&mut self, depth: usize) {
         let count = 1 + self.random.below(3);
         self.statements(count, depth);
     }
@@ -267,7 +269,7 @@ impl Generator {
     }
 
     /// `name := value` for the parameters, or the values alone where the order is known; `None` if a VAR_IN_OUT finds no variable.
-    fn arguments(&mut self, inputs: &[(String, Shape)], in_outs: &[(String, Shape)], depth: usize, all: bool) -> Option<Vec<String>> {
+    pub(super) fn arguments(&mut self, inputs: &[(String, Shape)], in_outs: &[(String, Shape)], depth: usize, all: bool) -> Option<Vec<String>> {
         let mut arguments = Vec::new();
         for (name, shape) in inputs {
             if all || self.random.chance(70) {

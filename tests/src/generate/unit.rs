@@ -72,7 +72,7 @@ impl Generator {
     }
 
     /// Elementary variables, so that operators find operands of many types.
-    fn elementaries(&mut self, section: &str, count: usize) {
+    pub(super) fn elementaries(&mut self, section: &str, count: usize) {
         let all: Vec<Variable> = (0..count).map(|i| Variable::new(format!("n{i}"), self.elementary())).collect();
         self.declare(section, &all);
         self.scope.extend(all);
@@ -95,7 +95,7 @@ impl Generator {
         self.reach(&data, true).map_or(Shape::Scalar(named("INT")), |(_, s)| s)
     }
 
-    fn declare_counters(&mut self, section: &str) {
+    pub(super) fn declare_counters(&mut self, section: &str) {
         let kinds = ["DINT", "INT", "SINT", "LINT", "UINT", "DINT"];
         let counters: Vec<Variable> = (0..3)
             .map(|i| Variable::fixed(format!("c{i}"), Shape::Scalar(named(kinds[self.random.below(if i == 0 { 6 } else { 4 })]))))
@@ -124,13 +124,13 @@ impl Generator {
         bound
     }
 
-    fn open_scope(&mut self) {
+    pub(super) fn open_scope(&mut self) {
         self.scope = self.globals.clone();
         self.loops = 0;
     }
 
     /// Statements of a unit whose variables are in scope.
-    fn body_of_unit(&mut self, bound: &[String], budget: usize) {
+    pub(super) fn body_of_unit(&mut self, bound: &[String], budget: usize) {
         self.budget = budget;
         self.indent = 1;
         for line in bound {
@@ -343,6 +343,7 @@ impl Generator {
         let instances = self.instances(4);
         self.declare("VAR", &instances);
         self.scope.extend(instances);
+        self.object_variables();
         self.elementaries("VAR", 14);
         self.declare_counters("VAR");
         let bound = self.references("VAR");
