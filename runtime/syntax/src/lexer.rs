@@ -301,8 +301,9 @@ impl<'a> Scanner<'a> {
 
     fn typographic_quote(&mut self, start: usize, open: char, close: char) {
         let from = self.here();
-        let line = self.text[from..].lines().next().unwrap_or("");
-        if let Some(length) = line.find(close) {
+        // A quoted text is short; looking further for its end would take quadratic time on a line of such quotes.
+        let mut line = self.text[from..].char_indices().take(400).take_while(|(_, c)| *c != '\n');
+        if let Some((length, _)) = line.find(|(_, c)| *c == close) {
             self.jump(from + length + close.len_utf8());
         }
         let help = "a STRING is written 'text', a WSTRING \"text\", both with straight quotes";

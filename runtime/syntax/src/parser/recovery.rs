@@ -1,7 +1,7 @@
 //! Ends of statements, and the way to the next one behind a mistake.
 
 use super::{Parser, is_statement_end, is_unit_end};
-use crate::lexer::Kind;
+use crate::lexer::{Kind, Token};
 use crate::{Code, Diagnostic};
 
 impl Parser<'_> {
@@ -88,9 +88,16 @@ impl Parser<'_> {
         self.failed = false;
     }
 
+    /// The tokens from `ahead` on to the end of the line or statement, as far as a person would look: no line of errors takes more than linear time.
+    pub(super) fn rest_of_line(&self, ahead: usize) -> &[Token] {
+        let rest = self.lexed.tokens.get(self.at + ahead..).unwrap_or_default();
+        let line = rest.iter().take(200).take_while(|token| !token.starts_line && token.kind != Kind::Semi);
+        &rest[..line.count()]
+    }
+
     /// Skips a label that cannot be read, if its `:` stands on this line.
     pub(super) fn skip_to_colon(&mut self) {
-        let line = self.lexed.tokens[self.at + 1..].iter().take_while(|token| !token.starts_line && token.kind != Kind::Semi);
+        let line = self.rest_of_line(1).iter();
         if let Some(distance) = line.map(|token| token.kind).position(|kind| kind == Kind::Colon) {
             self.at += distance + 2;
         }

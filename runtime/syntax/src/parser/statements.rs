@@ -328,7 +328,7 @@ impl Parser<'_> {
         if self.kind() == Kind::Semi || self.token().starts_line {
             return None;
         }
-        let line = self.lexed.tokens[self.at..].iter().take_while(|token| !token.starts_line && token.kind != Kind::Semi);
+        let line = self.rest_of_line(0).iter();
         let distance = line.clone().position(|token| matches!(token.kind, Kind::Then | Kind::Do | Kind::Of))?;
         let counts = line.clone().take(distance).any(|token| token.kind == Kind::To);
         let word = self.peek(distance).kind;

@@ -278,8 +278,10 @@ impl Parser<'_> {
     /// Skips to the next type, behind the fields of one whose head could not be read.
     fn recover_type(&mut self, brackets: i32) {
         let rest = &self.lexed.tokens[self.at..];
-        let boundary =
-            |kind: Kind| matches!(kind, Kind::Semi | Kind::EndType | Kind::EndStruct | Kind::EndUnion | Kind::Struct | Kind::Eof);
+        let boundary = |kind: Kind| {
+            matches!(kind, Kind::Semi | Kind::EndType | Kind::EndStruct | Kind::EndUnion | Kind::Struct | Kind::Eof)
+                || matches!(kind, Kind::Type | Kind::Program | Kind::Function | Kind::FunctionBlock)
+        };
         let mut ends = rest.iter().map(|token| token.kind).filter(|&kind| boundary(kind) && kind != Kind::Semi);
         let opens_first = rest.iter().find(|token| boundary(token.kind)).is_some_and(|token| token.kind == Kind::Struct);
         let has_fields = match ends.next() {
