@@ -74,7 +74,22 @@ macro_rules! wrapped_arg {
         }
     )*};
 }
-wrapped_arg!(Byte, Word, Dword, Lword, StTime, StDate, StTimeOfDay, StDateTime, StLtime);
+wrapped_arg!(
+    Byte,
+    Word,
+    Dword,
+    Lword,
+    StTime,
+    StDate,
+    StTimeOfDay,
+    StDateTime,
+    StLtime,
+    StLdate,
+    StLtimeOfDay,
+    StLdateTime,
+    StChar,
+    StWchar
+);
 
 impl Arg for f64 {
     fn take(_: &Cx<'_>, word: u64) -> Result<Self, Fault> {
@@ -108,15 +123,18 @@ impl<T> Arg for crate::Ptr<T> {
         Ok(self.0)
     }
 }
-impl<const N: usize> Arg for crate::Str<N> {
-    fn take(cx: &Cx<'_>, word: u64) -> Result<Self, Fault> {
-        cx.load(word)
-    }
-    fn give(self, cx: &mut Cx<'_>, place: u64) -> Result<u64, Fault> {
-        cx.store(place, &self)?;
-        Ok(0)
-    }
+macro_rules! text_arg {
+    ($($ty:ident),*) => {$(
+        impl<const N: usize> Arg for crate::$ty<N> {
+            fn take(cx: &Cx<'_>, word: u64) -> Result<Self, Fault> { cx.load(word) }
+            fn give(self, cx: &mut Cx<'_>, place: u64) -> Result<u64, Fault> {
+                cx.store(place, &self)?;
+                Ok(0)
+            }
+        }
+    )*};
 }
+text_arg!(Str, WStr);
 
 /// Declares a STRUCT: the Rust type (`repr(C)`, [`Plain`]) and `Self::DESC`.
 ///

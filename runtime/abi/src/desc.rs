@@ -43,6 +43,8 @@ pub enum FieldType {
     Elem(Elem),
     /// STRING(n): n+1 bytes.
     String(u32),
+    /// WSTRING(n): n+1 units of 16 bits.
+    WString(u32),
     /// ARRAY[low..high] OF elem.
     Array {
         /// Element type.

@@ -183,9 +183,9 @@ impl Lowering<'_, '_> {
         use Elem::*;
         const DAY: i64 = 86_400;
         let steps: &[(Op, i64)] = match (from, into) {
-            (Time, Ltime) | (Tod, Ltod) => &[(Op::Mul, 1_000_000)],
-            (Ltime, Time) => &[(Op::Div, 1_000_000)],
-            (Ltod, Tod) => &[(Op::DivU, 1_000_000)],
+            (Time | Tod, Ltime | Ltod) => &[(Op::Mul, 1_000_000)],
+            (Ltime, Time | Tod) => &[(Op::Div, 1_000_000)],
+            (Ltod, Tod | Time) => &[(Op::DivU, 1_000_000)],
             (Dt, Ldate) => &[(Op::Div, DAY), (Op::Mul, DAY * 1_000_000_000)],
             (Dt | Date, Ldt | Ldate) => &[(Op::Mul, 1_000_000_000)],
             (Ldt | Ldate, Dt) | (Ldate, Date) => &[(Op::DivU, 1_000_000_000)],
@@ -194,6 +194,8 @@ impl Lowering<'_, '_> {
             (Dt, Tod) => &[(Op::Rem, DAY), (Op::Mul, 1000)],
             (Ldt, Ldate) => &[(Op::DivU, DAY * 1_000_000_000), (Op::Mul, DAY * 1_000_000_000)],
             (Ldt, Ltod) => &[(Op::RemU, DAY * 1_000_000_000)],
+            (Ldt, Tod) => &[(Op::RemU, DAY * 1_000_000_000), (Op::DivU, 1_000_000)],
+            (Dt, Ltod) => &[(Op::Rem, DAY), (Op::Mul, 1_000_000_000)],
             _ => return a,
         };
         let lint = self.c.elem(Lint);

@@ -463,13 +463,15 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 }
             },
             Thing::Type(ty) => self.enumerator(ty, member),
-            Thing::Library => match self.c.library_names.get(&key(&member.text)).copied() {
-                Some(item) => self.item(item, &member.text, span),
-                None => {
-                    self.report(Code::UnknownMember, member.span, format!("the library has no `{}`", member.text));
-                    Thing::Error
+            Thing::Library => {
+                match self.c.library_member(if let ExprKind::Name(library) = &base.kind { library } else { "" }, &member.text) {
+                    Some(item) => self.item(item, &member.text, span),
+                    None => {
+                        self.report(Code::UnknownMember, member.span, format!("the library has no `{}`", member.text));
+                        Thing::Error
+                    }
                 }
-            },
+            }
             Thing::Error => Thing::Error,
             Thing::Function(_) | Thing::Native(_) | Thing::Action(..) => {
                 self.report(Code::UnknownMember, member.span, format!("a function has no member `{}`", member.text));

@@ -127,7 +127,7 @@ impl<'a> Compiler<'a> {
                 self.global_name(&name.text)
             }
             [library, name] if matches!(self.global_name(&library.text), Some(Item::Library)) => {
-                self.library_names.get(&key(&name.text)).copied()
+                self.library_member(&library.text, &name.text)
             }
             _ => None,
         };
