@@ -4,6 +4,7 @@
 //! it; a block in Rust is one declaration that holds its fields, its documentation and its body. No block knows the compiler, the engine or a bus.
 
 pub mod cnc;
+pub mod file;
 pub mod motion;
 pub mod standard;
 
@@ -51,7 +52,7 @@ const SHARED_ALIASES: &[(&str, &str)] = &[
     ("SM3_CNC", "Takt"),
 ];
 
-const BLOCK_TABLES: &[&[&BlockDesc]] = &[cnc::BLOCKS, motion::BLOCKS, standard::counters::BLOCKS];
+const BLOCK_TABLES: &[&[&BlockDesc]] = &[cnc::BLOCKS, file::BLOCKS, motion::BLOCKS, standard::counters::BLOCKS];
 const FUNCTION_TABLES: &[&[&FnDesc]] = &[
     cnc::FUNCTIONS,
     motion::FUNCTIONS,
@@ -64,13 +65,14 @@ const FUNCTION_TABLES: &[&[&FnDesc]] = &[
     standard::parse::FUNCTIONS,
     standard::text::FUNCTIONS,
 ];
-const ALIAS_TABLES: &[&[(&str, &str)]] = &[SHARED_ALIASES, cnc::ALIASES, motion::ALIASES, standard::memory::ALIASES];
+const ALIAS_TABLES: &[&[(&str, &str)]] = &[SHARED_ALIASES, cnc::ALIASES, file::ALIASES, motion::ALIASES, standard::memory::ALIASES];
 
 static BLOCKS: [&BlockDesc; total(BLOCK_TABLES)] = join(BLOCK_TABLES);
 static FUNCTIONS: [&FnDesc; total(FUNCTION_TABLES)] = join(FUNCTION_TABLES);
 static STRUCTS: [&StructDesc; SHARED_STRUCTS.len() + cnc::STRUCTS.len() + motion::STRUCTS.len()] =
     join(&[SHARED_STRUCTS, cnc::STRUCTS, motion::STRUCTS]);
-static ENUMS: [&EnumDesc; SHARED_ENUMS.len() + cnc::ENUMS.len() + motion::ENUMS.len()] = join(&[SHARED_ENUMS, cnc::ENUMS, motion::ENUMS]);
+const ENUM_TABLES: &[&[&EnumDesc]] = &[SHARED_ENUMS, cnc::ENUMS, file::ENUMS, motion::ENUMS];
+static ENUMS: [&EnumDesc; total(ENUM_TABLES)] = join(ENUM_TABLES);
 static ALIASES: [(&str, &str); total(ALIAS_TABLES)] = join(ALIAS_TABLES);
 
 /// How many entries the tables have together.

@@ -216,6 +216,18 @@ macro_rules! st_plain {
     };
 }
 
+/// Whether the members of a [`st_enum!`] need its name.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! st_qualified {
+    () => {
+        false
+    };
+    (qualified_only) => {
+        true
+    };
+}
+
 /// The initial value of a field.
 #[doc(hidden)]
 #[macro_export]
@@ -228,7 +240,8 @@ macro_rules! st_init {
     };
 }
 
-/// Declares an enumeration: a newtype over its base (any bit pattern is valid) with a constant per member, and `Self::DESC`.
+/// Declares an enumeration: a newtype over its base (any bit pattern is valid) with a constant per member, and `Self::DESC`. With `qualified_only`
+/// behind its base its members resolve only as `TYPE.member`.
 ///
 /// ```
 /// takt_abi::st_enum! {
@@ -239,7 +252,7 @@ macro_rules! st_init {
 /// ```
 #[macro_export]
 macro_rules! st_enum {
-    ($(#[doc = $doc:literal])* pub enum $st:ident as $rust:ident($base:ty, $elem:ident) { $($(#[doc = $mdoc:literal])* $member:ident = $value:expr),* $(,)? }) => {
+    ($(#[doc = $doc:literal])* pub enum $st:ident as $rust:ident($base:ty, $elem:ident $(, $only:ident)?) { $($(#[doc = $mdoc:literal])* $member:ident = $value:expr),* $(,)? }) => {
         $(#[doc = $doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
         #[repr(transparent)]
@@ -253,6 +266,7 @@ macro_rules! st_enum {
                 doc: concat!($($doc, "\n",)*),
                 base: $crate::Elem::$elem,
                 members: &[$((stringify!($member), $value as i64),)*],
+                qualified_only: $crate::st_qualified!($($only)?),
             };
         }
         impl $crate::Plain for $rust {

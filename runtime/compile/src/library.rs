@@ -13,7 +13,8 @@ impl Compiler<'_> {
             for desc in library.enums {
                 let ty = self.native_type(&FieldType::Enum(desc));
                 self.add_native(desc.name, Item::Ready(ty));
-                for (member, value) in desc.members {
+                let bare = if desc.qualified_only { &[] } else { desc.members };
+                for (member, value) in bare {
                     self.add_native(member, Item::Enumerator(ty, *value));
                 }
             }
