@@ -51,7 +51,11 @@ const OPERATOR_FUNCTIONS: &[(&str, BinaryOp)] = &[
 ];
 
 /// The others.
-const OTHERS: &[&str] = &["ABS", "MIN", "MAX", "LIMIT", "SEL", "MUX", "MOVE", "NOT", "SHL", "SHR", "ROL", "ROR", "ATAN2", "TRUNC", "ROUND"];
+const OTHERS: &[&str] = &["ABS", "MIN", "MAX", "LIMIT", "SEL", "MUX", "MOVE", "NOT", "SHL", "SHR", "ROL", "ROR", "ATAN2", "ROUND"];
+
+/// Changes of the byte order: whether bytes are swapped (the image is little endian).
+const BYTE_ORDERS: &[(&str, bool)] =
+    &[("TO_BIG_ENDIAN", true), ("BIG_ENDIAN_TO", true), ("TO_LITTLE_ENDIAN", false), ("LITTLE_ENDIAN_TO", false)];
 
 /// Names of the parameters, where arguments may be named.
 fn parameters(name: &str) -> &'static [&'static str] {
@@ -166,6 +170,9 @@ impl<'a> Lowering<'_, 'a> {
         if let Some(form) = time::find(name) {
             return self.time_function(form, operands, span);
         }
+        if let Some((_, swaps)) = BYTE_ORDERS.iter().find(|(n, _)| *n == name) {
+            return self.byte_order(name, *swaps, operands.remove(0), span);
+        }
         if let Some((_, single, double)) = REAL_FUNCTIONS.iter().find(|(n, ..)| *n == name) {
             return self.real_function(name, *single, *double, operands.remove(0), span);
         }
@@ -216,6 +223,7 @@ fn is_intrinsic(name: &str) -> bool {
     OTHERS.contains(&name)
         || REAL_FUNCTIONS.iter().any(|(n, ..)| *n == name)
         || OPERATOR_FUNCTIONS.iter().any(|(n, _)| *n == name)
+        || BYTE_ORDERS.iter().any(|(n, _)| *n == name)
         || conversion(name).is_some()
         || Decimal::find(name).is_some()
         || number::truncation(name).is_some()

@@ -1,9 +1,9 @@
 //! Decimal digits of four bits each (BCD). The compiler makes `WORD_BCD_TO_UINT`, `TO_BCD_BYTE` and their like of these two.
 
-use takt_abi::{FnDesc, Lword, native_fn};
+use takt_abi::{Bool, FnDesc, Lword, native_fn};
 
 /// All of them.
-pub const FUNCTIONS: &[&FnDesc] = &[Decode::DESC, Encode::DESC];
+pub const FUNCTIONS: &[&FnDesc] = &[Decode::DESC, Encode::DESC, ValidDecimal::DESC];
 
 native_fn! {
     /// The number that sixteen digits of four bits show. A digit above 9 counts with its value.
@@ -21,4 +21,8 @@ native_fn! {
             digits | digit << (4 * place)
         })))
     }
+}
+native_fn! {
+    /// Whether each four bits are a decimal digit (IEC 61131-3, table 37).
+    pub fn IS_VALID_BCD as ValidDecimal(_cx, IN: Lword) -> Bool { Ok((0..16).all(|place| IN.0 >> (4 * place) & 15 < 10).into()) }
 }

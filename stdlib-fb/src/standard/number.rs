@@ -1,10 +1,57 @@
-//! Functions of numbers from TwinCAT's libraries that ported programs call.
+//! Functions of numbers and bits: validity and byte order of IEC 61131-3, and what ported programs call of TwinCAT's libraries.
 
 use super::{Text, written};
-use takt_abi::{Bool, Dword, FnDesc, native_fn};
+use takt_abi::{Bool, Dword, FnDesc, Lword, native_fn};
 
 /// All of them.
-pub const FUNCTIONS: &[&FnDesc] = &[Frac::DESC, Lmod::DESC, Ltrunc::DESC, Modabs::DESC, HexText::DESC, FixedText::DESC];
+pub const FUNCTIONS: &[&FnDesc] = &[
+    IsValid::DESC,
+    SwapBytes::DESC,
+    Frac::DESC,
+    Lmod::DESC,
+    Ltrunc::DESC,
+    Modabs::DESC,
+    HexText::DESC,
+    FixedText::DESC,
+    GetBit::DESC,
+    SetBit::DESC,
+    ClearBit::DESC,
+    PutBit::DESC,
+];
+
+native_fn! {
+    /// Whether a REAL or LREAL is a number: neither NaN nor infinite (IEC 61131-3, table 37).
+    pub fn IS_VALID as IsValid(_cx, IN: f64) -> Bool { Ok(IN.is_finite().into()) }
+}
+native_fn! {
+    /// The low `SIZE` bytes of a number in reverse; what TO_BIG_ENDIAN is made of.
+    pub fn SWAP_BYTES as SwapBytes(_cx, IN: Lword, SIZE: u8) -> Lword {
+        Ok(Lword(IN.0.swap_bytes() >> (64 - 8 * u32::from(SIZE.clamp(1, 8)))))
+    }
+}
+native_fn! {
+    /// Bit `bitNo` of a number, 0 to 31 (Tc2_System); else FALSE.
+    pub fn GETBIT32 as GetBit(_cx, inVal32: Dword, bitNo: i8) -> Bool { Ok((inVal32.0 & bit(bitNo) != 0).into()) }
+}
+native_fn! {
+    /// The number with bit `bitNo` set (Tc2_System).
+    pub fn SETBIT32 as SetBit(_cx, inVal32: Dword, bitNo: i8) -> Dword { Ok(Dword(inVal32.0 | bit(bitNo))) }
+}
+native_fn! {
+    /// The number with bit `bitNo` cleared (Tc2_System).
+    pub fn CLEARBIT32 as ClearBit(_cx, inVal32: Dword, bitNo: i8) -> Dword { Ok(Dword(inVal32.0 & !bit(bitNo))) }
+}
+native_fn! {
+    /// The number with bit `bitNo` set to `bitVal` (Tc2_System).
+    pub fn CSETBIT32 as PutBit(_cx, inVal32: Dword, bitNo: i8, bitVal: Bool) -> Dword {
+        Ok(Dword(if bitVal.get() { inVal32.0 | bit(bitNo) } else { inVal32.0 & !bit(bitNo) }))
+    }
+}
+
+/// The bit of that number; none outside of 0 to 31.
+fn bit(number: i8) -> u32 {
+    u32::try_from(number).ok().and_then(|n| 1u32.checked_shl(n)).unwrap_or(0)
+}
 
 native_fn! {
     /// What stands behind the point, with the sign of the number (Tc2_Math).

@@ -163,11 +163,16 @@ impl Lowering<'_, '_> {
 
     /// Calls a function of the library with one argument.
     pub(super) fn library_function(&mut self, name: &str, a: Operand, span: Span) -> Operand {
-        if a.is_error() {
-            return a;
+        self.library_call(name, vec![a], span)
+    }
+
+    /// Calls a function of the library.
+    pub(super) fn library_call(&mut self, name: &str, operands: Vec<Operand>, span: Span) -> Operand {
+        if operands.iter().any(Operand::is_error) {
+            return self.error(span);
         }
         match self.c.library_names.get(name).copied() {
-            Some(Item::NativeFunction(desc)) => self.native_with(desc, vec![a], span),
+            Some(Item::NativeFunction(desc)) => self.native_with(desc, operands, span),
             _ => {
                 self.report(Code::UnknownName, span, format!("no library of this project has `{name}`"));
                 self.error(span)

@@ -106,6 +106,20 @@ impl Lowering<'_, '_> {
         }
     }
 
+    /// An integer with its bytes in the other order.
+    pub(super) fn byte_order(&mut self, name: &str, swaps: bool, a: Operand, span: Span) -> Operand {
+        let Class::Int(e) = self.class(a.ty) else { return self.refuse(name, &a, span) };
+        let (ty, size) = (a.ty, takt_ir::elem_size(e));
+        if !swaps || size == 1 {
+            return a;
+        }
+        let (word, byte) = (self.c.elem(Elem::Lword), self.c.elem(Elem::Usint));
+        let a = self.explicit(Operand { flex: false, ..a }, word);
+        let size = self.constant(Value::Int(size.into()), byte, span);
+        let result = self.library_call("SWAP_BYTES", vec![a, size], span);
+        self.explicit(result, ty)
+    }
+
     /// Conversions to and from decimal digits of four bits each.
     pub(super) fn decimal(&mut self, name: &str, form: Decimal, a: Operand, span: Span) -> Operand {
         let (helper, word, from, into) = match form {
