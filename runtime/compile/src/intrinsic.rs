@@ -85,6 +85,7 @@ fn parameter(name: &str, argument: &str, position: usize) -> Option<usize> {
     let named = parameters(name).iter().position(|p| *p == argument);
     // MUX begins to count its inputs behind the selector K, the others at IN1.
     let numbered = || match (name, argument) {
+        ("LIMIT" | "SEL" | "SHL" | "SHR" | "ROL" | "ROR" | "ATAN2", _) => None,
         ("MUX", "K") => Some(0),
         ("MUX", _) => argument.strip_prefix("IN")?.parse::<usize>().ok()?.checked_add(1),
         _ => argument.strip_prefix("IN")?.parse::<usize>().ok()?.checked_sub(1),

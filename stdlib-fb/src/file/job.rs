@@ -3,7 +3,7 @@
 use takt_abi::{Chunk, Host, HostError, Request, Resource, Ticket};
 
 /// One request at a time. An abandoned one is waited for before the next, because its answer takes a place in the host.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Job {
     ticket: Option<Ticket>,
     stale: bool,
@@ -11,10 +11,17 @@ pub struct Job {
     spare: Vec<u8>,
 }
 
+impl Default for Job {
+    /// With room for a path.
+    fn default() -> Self {
+        Self::with_buffer(256)
+    }
+}
+
 impl Job {
-    /// With a buffer, so that the first request does not allocate.
+    /// With a buffer of its own, so that no request allocates.
     pub fn with_buffer(size: usize) -> Self {
-        Self { spare: Vec::with_capacity(size), ..Self::default() }
+        Self { ticket: None, stale: false, spare: Vec::with_capacity(size) }
     }
 
     /// Whether the next [`Job::run`] asks.

@@ -4,10 +4,10 @@ use super::FileError;
 use super::job::Job;
 use super::open::file;
 use super::trigger::{Action, Step, file_block, pins};
-use takt_abi::{Bool, Chunk, Cx, Env, Fault, Lword, Request, Str};
+use takt_abi::{Bool, Cx, Env, Fault, Lword, Request, Str};
 
-/// Runs the job of the instance; what comes of its answer is over.
-fn run(cx: &mut Cx<'_>, request: impl FnOnce() -> Request, answered: impl FnOnce(Chunk)) -> Result<Step, Fault> {
+/// Runs the job of the instance; `answered` is told the size of the file.
+fn run(cx: &mut Cx<'_>, request: impl FnOnce() -> Request, answered: impl FnOnce(u64)) -> Result<Step, Fault> {
     let Some(own) = cx.own() else { return Ok(Step::Over(FileError::HANDLE_INVALID)) };
     let Env { resources, host, .. } = &mut *cx.env;
     let Some(job) = resources.get::<Job>(own) else { return Err(Fault::Panic) };
@@ -15,7 +15,8 @@ fn run(cx: &mut Cx<'_>, request: impl FnOnce() -> Request, answered: impl FnOnce
         None => Step::Busy,
         Some(Err(error)) => Step::Over(error.into()),
         Some(Ok(chunk)) => {
-            answered(chunk);
+            answered(chunk.file_size);
+            job.give_back(chunk.data);
             Step::Over(FileError::NO_ERROR)
         }
     })
@@ -108,7 +109,7 @@ impl Action for FileEof {
     }
     fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
         let Some(open) = file(&mut cx.env.resources, self.hFile).copied() else { return Ok(Step::Over(FileError::HANDLE_INVALID)) };
-        run(cx, || Request::Size { path: open.path }, |chunk| self.xEOF = (open.position >= chunk.file_size).into())
+        run(cx, || Request::Size { path: open.path }, |size| self.xEOF = (open.position >= size).into())
     }
 }
 
@@ -158,7 +159,7 @@ impl Action for FileGetSize {
     }
     fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
         let path = self.sFileName;
-        run(cx, || Request::Size { path }, |chunk| self.szSize = chunk.file_size)
+        run(cx, || Request::Size { path }, |size| self.szSize = size)
     }
 }
 

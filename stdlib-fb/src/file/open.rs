@@ -151,6 +151,7 @@ impl Action for FileOpen {
         Ok(Step::Over(match answer {
             Err(error) => error.into(),
             Ok(chunk) => {
+                opener.job.give_back(chunk.data);
                 let appends = matches!(mode, FileMode::MAPPD | FileMode::MAPPDPLUS);
                 match opener.add(path, mode, if appends { chunk.file_size } else { 0 }) {
                     Some(id) => {

@@ -292,8 +292,11 @@ fn long_real(value: f64) -> Text {
     Str(line.bytes)
 }
 
-/// The number with `places` digits behind the point, rounded half up or cut.
+/// The number with `places` (at most 100) digits behind the point, rounded half up or cut; from 1E60 on as LREAL_TO_STRING shows it.
 pub(super) fn fixed(value: f64, places: usize, round: bool) -> Text {
+    if value.abs() >= 1e60 {
+        return long_real(value);
+    }
     let mut line = Line::new();
     if value != 0.0 && special(value, &mut line) {
         return Str(line.bytes);
@@ -384,6 +387,24 @@ mod tests {
     }
 
     #[test]
+    fn any_bits_show_as_a_number_that_is_close() {
+        let mut bits = 0x9E37_79B9_7F4A_7C15u64;
+        for _ in 0..20_000 {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let (long, short) = (f64::from_bits(bits), f32::from_bits((bits >> 32) as u32));
+            if long.is_finite() {
+                let back: f64 = long_real(long).to_text().parse().expect("a number");
+                assert!((back - long).abs() <= long.abs() * 1e-14, "{long:e}");
+            }
+            if short.is_finite() {
+                let back: f64 = real(short).to_text().parse().expect("a number");
+                assert!((back - f64::from(short)).abs() <= f64::from(short.abs()) * 1e-6, "{short:e}");
+            }
+            assert!(!fixed(long, (bits % 101) as usize, bits & 1 == 0).bytes().is_empty());
+        }
+    }
+
+    #[test]
     fn a_number_shows_as_many_decimals_as_are_asked_for() {
         for (value, places, round, text) in [
             (0.46523, 2, true, "0.47"),
@@ -393,6 +414,8 @@ mod tests {
             (0.0, 3, true, "0.000"),
             (2.5, 0, true, "3"),
             (12.0, 1, false, "12.0"),
+            (1e200, 2, true, "1.0e200"),
+            (f64::NAN, 2, true, "#NaN"),
         ] {
             shows(fixed(value, places, round), text);
         }

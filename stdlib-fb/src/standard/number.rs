@@ -80,7 +80,7 @@ native_fn! {
     }
 }
 native_fn! {
-    /// The number with `iPrecision` digits behind the point (Tc2_Utilities), rounded with `bRound`, else cut.
+    /// The number with `iPrecision` digits behind the point (Tc2_Utilities), rounded with `bRound`, else cut; from 1E60 on with an exponent.
     pub fn LREAL_TO_FMTSTR as FixedText(_cx, IN: f64, iPrecision: i16, bRound: Bool) -> Text {
         let places = usize::from(u16::try_from(iPrecision).unwrap_or(0)).min(100);
         Ok(super::format::fixed(IN, places, bRound.get()))

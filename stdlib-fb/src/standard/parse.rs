@@ -256,4 +256,24 @@ mod tests {
             (Some(86_400_000_000_000), None, Some(9_900_000_000))
         );
     }
+    #[test]
+    fn any_text_is_read_without_a_panic() {
+        let letters = b"0123456789-+._:#TDLOtdhmsunE \xFF";
+        let mut state = 1u64;
+        for _ in 0..50_000 {
+            let text: Vec<u8> = (0..state % 24)
+                .map(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    letters[(state >> 33) as usize % letters.len()]
+                })
+                .collect();
+            state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            integer(&text);
+            number(&text).map(|n| n.parse::<f64>());
+            body(&text, &["T"]);
+            span(&text);
+            clock(&text);
+            moment(&text);
+        }
+    }
 }

@@ -37,11 +37,19 @@ fn count(n: i16) -> usize {
     usize::try_from(n).unwrap_or(0)
 }
 
-/// `all` with `length` units from `position` replaced.
-fn replaced<T: Copy + Default>(all: &[T], with: &[T], length: i16, position: i16) -> [T; 256] {
+/// What stands before and behind the units from `position` on, `length` of them; of those before position 1 there are none to take away.
+fn around<T>(all: &[T], length: i16, position: i16) -> (&[T], &[T]) {
+    let from = i32::from(position) - 1;
     let start = count(position).saturating_sub(1).min(all.len());
-    let end = (start + count(length)).min(all.len());
-    filled(all[..start].iter().chain(with).chain(&all[end..]).copied())
+    let end = usize::try_from(from + i32::from(length).max(0)).unwrap_or(0).clamp(start, all.len());
+    (&all[..start], &all[end..])
+}
+
+/// `all` with `length` units from `position` replaced; unchanged when the position lies behind it.
+fn replaced<T: Copy + Default>(all: &[T], with: &[T], length: i16, position: i16) -> [T; 256] {
+    let (head, tail) = around(all, length, position);
+    let with = if count(position) <= all.len() + 1 { with } else { &[] };
+    filled(head.iter().chain(with).chain(tail).copied())
 }
 
 /// Position of the first `part` in `all`, 0 if there is none.
@@ -73,9 +81,10 @@ macro_rules! text_functions {
             }
         }
         native_fn! {
-            /// `LEN` characters from position `POS`.
+            /// `LEN` characters from position `POS`; none from before the first.
             pub fn $mid as $Mid(_cx, STR: $text, LEN: i16, POS: i16) -> $text {
-                Ok($wrap(filled(STR.$units().iter().copied().skip(count(POS).saturating_sub(1)).take(count(LEN)))))
+                let length = if POS < 1 { 0 } else { count(LEN) };
+                Ok($wrap(filled(STR.$units().iter().copied().skip(count(POS).saturating_sub(1)).take(length))))
             }
         }
         native_fn! {
@@ -85,9 +94,9 @@ macro_rules! text_functions {
             }
         }
         native_fn! {
-            /// `STR1` with `STR2` put in behind position `POS`; 0 is before the first character.
+            /// `STR1` with `STR2` put in behind position `POS`; 0 is before the first character; unchanged where there is no such position.
             pub fn $insert as $Insert(_cx, STR1: $text, STR2: $text, POS: i16) -> $text {
-                let (head, tail) = STR1.$units().split_at(count(POS).min(STR1.$units().len()));
+                let Some((head, tail)) = usize::try_from(POS).ok().and_then(|at| STR1.$units().split_at_checked(at)) else { return Ok(STR1) };
                 Ok($wrap(filled(head.iter().chain(STR2.$units()).chain(tail).copied())))
             }
         }
@@ -96,7 +105,7 @@ macro_rules! text_functions {
             pub fn $delete as $Delete(_cx, STR: $text, LEN: i16, POS: i16) -> $text { Ok($wrap(replaced(STR.$units(), &[], LEN, POS))) }
         }
         native_fn! {
-            /// `STR1` with `L` characters from position `P` replaced by `STR2`.
+            /// `STR1` with `L` characters from position `P` replaced by `STR2`; unchanged where there is no such position.
             pub fn $replace as $Replace(_cx, STR1: $text, STR2: $text, L: i16, P: i16) -> $text {
                 Ok($wrap(replaced(STR1.$units(), STR2.$units(), L, P)))
             }
@@ -142,8 +151,13 @@ mod tests {
         let s = b"ABCDEF";
         check(replaced(s, b"xy", 2, 3), b"ABxyEF");
         check(replaced(s, b"", 9, 5), b"ABCD");
-        check(replaced(s, b"!", -1, 99), b"ABCDEF!");
-        check(replaced(s, b"", 2, 0), b"CDEF");
+        check(replaced(s, b"!", -1, 99), b"ABCDEF");
+        check(replaced(s, b"!", 3, 7), b"ABCDEF!");
+        check(replaced(s, b"!", 0, 1), b"!ABCDEF");
+        check(replaced(s, b"", 2, 0), b"BCDEF");
+        check(replaced(s, b"", 2, -1), b"ABCDEF");
+        check(replaced(s, b"", i16::MAX, i16::MAX), b"ABCDEF");
+        check(replaced(s, b"", i16::MAX, i16::MIN), b"ABCDEF");
     }
 
     #[test]
