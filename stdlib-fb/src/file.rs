@@ -4,7 +4,7 @@
 //! the others; the file itself is opened by the host for each request, so a handle costs nothing and nothing leaks. Paths are relative to `data`; one
 //! that leaves it, by name or by link, is refused. Memory is bounded: eight files per FILE.Open, 256 KiB per FILE.Read and FILE.Write.
 //!
-//! Lacks folders (FILE.DirOpen and its like), attributes and times of files, and FILE.Copy.
+//! Lacks listing and removing folders (FILE.DirOpen, DirList, DirRemove), attributes and times of files, and FILE.Copy.
 
 mod data;
 mod job;
@@ -13,7 +13,7 @@ mod open;
 mod trigger;
 
 pub use data::{FileRead, FileWrite};
-pub use manage::{FileDelete, FileEof, FileFlush, FileGetPos, FileGetSize, FileRename, FileSetPos};
+pub use manage::{FileDelete, FileDirCreate, FileEof, FileFlush, FileGetPos, FileGetSize, FileRename, FileSetPos};
 pub use open::{FileClose, FileOpen};
 
 use takt_abi::{BlockDesc, EnumDesc, HostError, st_enum};
@@ -97,6 +97,7 @@ pub const BLOCKS: &[&BlockDesc] = &[
     FileGetSize::DESC,
     FileDelete::DESC,
     FileRename::DESC,
+    FileDirCreate::DESC,
 ];
 /// The enumerations of this topic.
 pub const ENUMS: &[&EnumDesc] = &[FileMode::DESC, FileError::DESC];

@@ -119,6 +119,22 @@ END_PROGRAM";
 }
 
 #[test]
+fn a_program_makes_a_folder_for_its_files() {
+    let source = "
+PROGRAM main
+VAR dir, again : FILE.DirCreate; op : FILE.Open; wr : FILE.Write; text : STRING := 'x'; exists : BOOL; END_VAR
+dir(xExecute := TRUE, sDirName := 'logs/2026', xParent := TRUE);
+again(xExecute := dir.xDone, sDirName := 'logs');
+op(xExecute := dir.xDone, sFileName := 'logs/2026/a.txt', eFileMode := FILE.MODE.MWRITE);
+wr(xExecute := op.xDone, hFile := op.hFile, pBuffer := ADR(text), szSize := 1);
+exists := again.eError = FILE.ERROR.EXIST;
+END_PROGRAM";
+    let (values, project) = run("folder", source, 20, &["main.dir.xDone", "main.exists", "main.wr.xDone"], |_| {});
+    assert_eq!(values, ["TRUE"; 3]);
+    assert_eq!(project.text("logs/2026/a.txt"), "x");
+}
+
+#[test]
 fn more_than_a_chunk_goes_to_a_file_and_back() {
     let source = "
 PROGRAM main

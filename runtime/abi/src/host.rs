@@ -40,6 +40,13 @@ pub enum Request {
         /// Whether a file that exists keeps its content.
         keep: bool,
     },
+    /// Makes a folder in `data/`.
+    CreateFolder {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+        /// Whether the folders it lies in are made too.
+        parents: bool,
+    },
     /// Asks for the size of a file in `data/`.
     Size {
         /// Relative path, UTF-8.

@@ -1,4 +1,4 @@
-//! FILE.GetPos, SetPos, EOF, Flush, GetSize, Delete, Rename: what is neither opening nor moving bytes.
+//! FILE.GetPos, SetPos, EOF, Flush, GetSize, Delete, Rename, DirCreate: what is neither opening nor moving bytes.
 
 use super::FileError;
 use super::job::Job;
@@ -217,5 +217,29 @@ impl Action for FileRename {
             job.give_back(buffer);
         }
         run(cx, || Request::Rename { path }, drop)
+    }
+}
+
+file_block! {
+    /// `FILE.DirCreate` of CODESYS' CAA File: makes a folder.
+    FILE_DirCreate as FileDirCreate ["FILE.DirCreate"] resource Job;
+    input {
+        /// The folder, relative to `data`.
+        sDirName: Str<256>,
+        /// The folders it lies in are made too.
+        xParent: Bool
+    }
+    output {}
+    state {}
+}
+
+impl Action for FileDirCreate {
+    pins!();
+    fn begin(&mut self, _: &mut Cx<'_>) -> Result<Step, Fault> {
+        Ok(named(&self.sDirName))
+    }
+    fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
+        let (path, parents) = (self.sDirName, self.xParent.get());
+        run(cx, || Request::CreateFolder { path, parents }, drop)
     }
 }

@@ -1,7 +1,7 @@
 //! Functions of numbers and bits: validity and byte order of IEC 61131-3, and what ported programs call of TwinCAT's libraries.
 
 use super::{Text, written};
-use takt_abi::{Bool, Dword, FnDesc, Lword, native_fn};
+use takt_abi::{Bool, Byte, Dword, FnDesc, Lword, Word, native_fn};
 
 /// All of them.
 pub const FUNCTIONS: &[&FnDesc] = &[
@@ -11,7 +11,12 @@ pub const FUNCTIONS: &[&FnDesc] = &[
     Lmod::DESC,
     Ltrunc::DESC,
     Modabs::DESC,
-    HexText::DESC,
+    HexByte::DESC,
+    HexWord::DESC,
+    HexDword::DESC,
+    HexLword::DESC,
+    BinaryText::DESC,
+    DecimalText::DESC,
     FixedText::DESC,
     GetBit::DESC,
     SetBit::DESC,
@@ -72,13 +77,41 @@ native_fn! {
         Ok(if rest < 0.0 { rest + lr_Arg.abs() } else { rest })
     }
 }
+macro_rules! hexadecimal {
+    ($name:ident as $rust:ident($type:ty)) => {
+        native_fn! {
+            /// At least `iPrecision` hexadecimal digits (Tc2_Utilities), small letters with `bLoCase`.
+            pub fn $name as $rust(_cx, IN: $type, iPrecision: i16, bLoCase: Bool) -> Text {
+                let width = digits(iPrecision);
+                Ok(if bLoCase.get() { written(format_args!("{:0width$x}", IN.0)) } else { written(format_args!("{:0width$X}", IN.0)) })
+            }
+        }
+    };
+}
+hexadecimal!(BYTE_TO_HEXSTR as HexByte(Byte));
+hexadecimal!(WORD_TO_HEXSTR as HexWord(Word));
+hexadecimal!(DWORD_TO_HEXSTR as HexDword(Dword));
+hexadecimal!(LWORD_TO_HEXSTR as HexLword(Lword));
+
 native_fn! {
-    /// At least `iPrecision` hexadecimal digits (Tc2_Utilities), small letters with `bLoCase`.
-    pub fn DWORD_TO_HEXSTR as HexText(_cx, IN: Dword, iPrecision: i16, bLoCase: Bool) -> Text {
-        let width = usize::try_from(iPrecision).unwrap_or(0).min(255);
-        Ok(if bLoCase.get() { written(format_args!("{:0width$x}", IN.0)) } else { written(format_args!("{:0width$X}", IN.0)) })
+    /// At least `iPrecision` binary digits (Tc2_Utilities).
+    pub fn DWORD_TO_BINSTR as BinaryText(_cx, IN: Dword, iPrecision: i16) -> Text {
+        Ok(written(format_args!("{:0width$b}", IN.0, width = digits(iPrecision))))
     }
 }
+native_fn! {
+    /// At least `iPrecision` decimal digits behind the sign (Tc2_Utilities).
+    pub fn DINT_TO_DECSTR as DecimalText(_cx, IN: i32, iPrecision: i16) -> Text {
+        let sign = if IN < 0 { "-" } else { "" };
+        Ok(written(format_args!("{sign}{:0width$}", IN.unsigned_abs(), width = digits(iPrecision))))
+    }
+}
+
+/// A number of digits that a text holds.
+fn digits(precision: i16) -> usize {
+    usize::try_from(precision).unwrap_or(0).min(200)
+}
+
 native_fn! {
     /// The number with `iPrecision` digits behind the point (Tc2_Utilities), rounded with `bRound`, else cut; from 1E60 on with an exponent.
     pub fn LREAL_TO_FMTSTR as FixedText(_cx, IN: f64, iPrecision: i16, bRound: Bool) -> Text {

@@ -12,6 +12,7 @@ pub(super) fn serve(data: &Path, request: Request, bytes: &[u8]) -> Result<u64, 
         Request::Read { .. } => Err(HostError::NotReadable),
         Request::Write { path, offset } => write(data, &path.to_text(), offset, bytes),
         Request::Create { path, keep } => create(data, &path.to_text(), keep),
+        Request::CreateFolder { path, parents } => create_folder(data, &path.to_text(), parents),
         Request::Size { path } => size(&confine::open(&confine::resolve(data, &path.to_text())?)?),
         Request::Sync { path } => {
             let file = existing(data, &path.to_text())?;
@@ -38,10 +39,30 @@ fn write(data: &Path, path: &str, offset: Option<u64>, bytes: &[u8]) -> Result<u
     size(&file)
 }
 
-fn create(data: &Path, path: &str, keep: bool) -> Result<u64, HostError> {
-    if !data.exists() {
-        std::fs::create_dir(data).map_err(refused)?;
+/// Makes `data` itself, before anything is put into it.
+fn prepare(data: &Path) -> Result<(), HostError> {
+    if data.exists() { Ok(()) } else { std::fs::create_dir(data).map_err(refused) }
+}
+
+fn create_folder(data: &Path, path: &str, parents: bool) -> Result<u64, HostError> {
+    prepare(data)?;
+    if parents {
+        for (end, _) in path.match_indices('/') {
+            let folder = confine::resolve_new(data, &path[..end])?;
+            if !folder.exists() {
+                std::fs::create_dir(folder).map_err(refused)?;
+            }
+        }
     }
+    let folder = confine::resolve_new(data, path)?;
+    if folder.exists() {
+        return Err(HostError::Exists);
+    }
+    std::fs::create_dir(folder).map_err(refused).map(|()| 0)
+}
+
+fn create(data: &Path, path: &str, keep: bool) -> Result<u64, HostError> {
+    prepare(data)?;
     let place = confine::resolve_new(data, path)?;
     let file = confine::open_as(&place, File::options().write(true).create(true)).map_err(not_writable)?;
     if !keep {
@@ -128,6 +149,24 @@ mod tests {
         assert_eq!(folder.ask(Request::Delete { path: a }, b""), Err(HostError::NotFound));
         assert_eq!(folder.ask(Request::Delete { path: c }, b""), Ok(0));
         assert_eq!(folder.ask(Request::Size { path: c }, b""), Err(HostError::NotFound));
+    }
+
+    #[test]
+    fn folders_are_made_inside_and_only_once() {
+        let folder = Folder::new("folders");
+        let make = |name: &str, parents| folder.ask(Request::CreateFolder { path: Str::new(name), parents }, b"");
+        assert_eq!(make("a/b", false), Err(HostError::NotFound));
+        assert_eq!(make("a/b/c", true), Ok(0));
+        assert_eq!(make("a/b", false), Err(HostError::Exists));
+        assert_eq!(make("a/b/d", false), Ok(0));
+        assert_eq!(folder.ask(Request::Create { path: Str::new("a/b/c/log"), keep: false }, b""), Ok(0));
+        assert_eq!(make("a/b/c/log/x", true), Err(HostError::NotFound));
+        for name in ["../x", "a/../../x", "/x", "a//b", ""] {
+            for parents in [false, true] {
+                assert!(matches!(make(name, parents), Err(HostError::Outside | HostError::Exists)), "{name}");
+            }
+        }
+        assert!(!folder.0.join("x").exists());
     }
 
     #[test]
