@@ -228,7 +228,7 @@ op(xExecute := TRUE, sFileName := 'a', eFileMode := FILE.MODE.MWRITE);
 IF op.xDone THEN
     n := n + 1;
     wr(xExecute := n <> 4, xAbort := n = 2, hFile := op.hFile, pBuffer := ADR(x), szSize := 4);
-    IF n = 2 THEN aborted := wr.xAborted; code := wr.eError; END_IF
+    IF n = 2 THEN aborted := wr.xAborted AND NOT wr.xError; code := wr.eError; END_IF
 END_IF
 END_PROGRAM";
     let (values, project) = run("abort", source, 20, &["main.aborted", "main.code", "main.wr.xDone"], |_| {});

@@ -59,7 +59,9 @@ pub(super) fn call<A: Action>(action: &mut A, cx: &mut Cx<'_>) -> Result<(), Fau
     if let Step::Over(code) = step {
         let pins = action.pins();
         *pins.busy = Bool::FALSE;
-        (*pins.done, *pins.error) = ((code == FileError::NO_ERROR).into(), (code != FileError::NO_ERROR).into());
+        // An aborted action is neither done nor in error.
+        let error = !matches!(code, FileError::NO_ERROR | FileError::ABORT);
+        (*pins.done, *pins.error) = ((code == FileError::NO_ERROR).into(), error.into());
         *pins.code = code;
     }
     Ok(())
