@@ -4,19 +4,21 @@
 //! the others; the file itself is opened by the host for each request, so a handle costs nothing and nothing leaks. Paths are relative to `data`; one
 //! that leaves it, by name or by link, is refused. Memory is bounded: eight files per FILE.Open, 256 KiB per FILE.Read and FILE.Write.
 //!
-//! Lacks listing and removing folders (FILE.DirOpen, DirList, DirRemove), attributes and times of files, and FILE.Copy.
+//! Lacks FILE.Copy, removing and renaming folders, and attributes and times of files.
 
 mod data;
+mod folder;
 mod job;
 mod manage;
 mod open;
 mod trigger;
 
 pub use data::{FileRead, FileWrite};
-pub use manage::{FileDelete, FileDirCreate, FileEof, FileFlush, FileGetPos, FileGetSize, FileRename, FileSetPos};
+pub use folder::{DirEntry, FileDirClose, FileDirCreate, FileDirList, FileDirOpen};
+pub use manage::{FileDelete, FileEof, FileFlush, FileGetPos, FileGetSize, FileRename, FileSetPos};
 pub use open::{FileClose, FileOpen};
 
-use takt_abi::{BlockDesc, EnumDesc, HostError, st_enum};
+use takt_abi::{BlockDesc, EnumDesc, HostError, StructDesc, st_enum};
 
 st_enum! {
     /// How FILE.Open opens a file.
@@ -97,9 +99,20 @@ pub const BLOCKS: &[&BlockDesc] = &[
     FileGetSize::DESC,
     FileDelete::DESC,
     FileRename::DESC,
+    FileDirOpen::DESC,
+    FileDirList::DESC,
+    FileDirClose::DESC,
     FileDirCreate::DESC,
 ];
+/// The structures of this topic.
+pub const STRUCTS: &[&StructDesc] = &[DirEntry::DESC];
 /// The enumerations of this topic.
 pub const ENUMS: &[&EnumDesc] = &[FileMode::DESC, FileError::DESC];
 /// Other names: (alias, canonical).
-pub const ALIASES: &[(&str, &str)] = &[("FILE", "Takt"), ("CAA", "Takt"), ("FILE.MODE", "FILE_MODE"), ("FILE.ERROR", "FILE_ERROR")];
+pub const ALIASES: &[(&str, &str)] = &[
+    ("FILE", "Takt"),
+    ("CAA", "Takt"),
+    ("FILE.MODE", "FILE_MODE"),
+    ("FILE.ERROR", "FILE_ERROR"),
+    ("FILE.FILE_DIR_ENTRY", "FILE_DIR_ENTRY"),
+];

@@ -69,8 +69,8 @@ const ALIAS_TABLES: &[&[(&str, &str)]] = &[SHARED_ALIASES, cnc::ALIASES, file::A
 
 static BLOCKS: [&BlockDesc; total(BLOCK_TABLES)] = join(BLOCK_TABLES);
 static FUNCTIONS: [&FnDesc; total(FUNCTION_TABLES)] = join(FUNCTION_TABLES);
-static STRUCTS: [&StructDesc; SHARED_STRUCTS.len() + cnc::STRUCTS.len() + motion::STRUCTS.len()] =
-    join(&[SHARED_STRUCTS, cnc::STRUCTS, motion::STRUCTS]);
+const STRUCT_TABLES: &[&[&StructDesc]] = &[SHARED_STRUCTS, cnc::STRUCTS, file::STRUCTS, motion::STRUCTS];
+static STRUCTS: [&StructDesc; total(STRUCT_TABLES)] = join(STRUCT_TABLES);
 const ENUM_TABLES: &[&[&EnumDesc]] = &[SHARED_ENUMS, cnc::ENUMS, file::ENUMS, motion::ENUMS];
 static ENUMS: [&EnumDesc; total(ENUM_TABLES)] = join(ENUM_TABLES);
 static ALIASES: [(&str, &str); total(ALIAS_TABLES)] = join(ALIAS_TABLES);

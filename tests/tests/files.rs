@@ -135,6 +135,41 @@ END_PROGRAM";
 }
 
 #[test]
+fn a_program_lists_a_folder() {
+    let source = "
+PROGRAM main
+VAR
+    op : FILE.DirOpen; ls : FILE.DirList; cl : FILE.DirClose; entry : FILE.FILE_DIR_ENTRY;
+    names : STRING; bytes : ULINT; folders : INT; over, closed : BOOL;
+END_VAR
+op(xExecute := TRUE, sDirName := './');
+IF op.xDone AND NOT over THEN
+    ls(xExecute := NOT (ls.xDone OR ls.xError), hDir := op.hDir);
+    IF ls.xDone THEN
+        entry := ls.deDirEntry;
+        names := CONCAT(names, entry.sEntry, ' ');
+        bytes := bytes + entry.szSize;
+        IF entry.xDirectory THEN folders := folders + 1; END_IF
+    END_IF
+    over := ls.xError AND ls.eError = FILE.ERROR.NO_MORE_ENTRIES;
+END_IF
+cl(xExecute := over, hDir := op.hDir);
+IF cl.xDone AND NOT closed THEN
+    ls(xExecute := FALSE);
+    ls(xExecute := TRUE, hDir := op.hDir);
+    closed := ls.eError = FILE.ERROR.HANDLE_INVALID;
+END_IF
+END_PROGRAM";
+    let paths = ["main.names", "main.bytes", "main.folders", "main.over", "main.closed"];
+    let (values, _) = run("list", source, 30, &paths, |project| {
+        std::fs::create_dir_all(project.0.join("data/logs")).expect("data");
+        std::fs::write(project.0.join("data/b.txt"), "12345").expect("a file");
+        std::fs::write(project.0.join("data/a.txt"), "12").expect("a file");
+    });
+    assert_eq!(values, ["'a.txt b.txt logs '", "7", "1", "TRUE", "TRUE"]);
+}
+
+#[test]
 fn more_than_a_chunk_goes_to_a_file_and_back() {
     let source = "
 PROGRAM main
@@ -227,11 +262,12 @@ VAR op : FILE.Open; wr : FILE.Write; n : INT; aborted : BOOL; code : FILE.ERROR;
 op(xExecute := TRUE, sFileName := 'a', eFileMode := FILE.MODE.MWRITE);
 IF op.xDone THEN
     n := n + 1;
+    IF n = 4 THEN x := 16#45464748; END_IF
     wr(xExecute := n <> 4, xAbort := n = 2, hFile := op.hFile, pBuffer := ADR(x), szSize := 4);
     IF n = 2 THEN aborted := wr.xAborted AND NOT wr.xError; code := wr.eError; END_IF
 END_IF
 END_PROGRAM";
     let (values, project) = run("abort", source, 20, &["main.aborted", "main.code", "main.wr.xDone"], |_| {});
     assert_eq!(values, ["TRUE", "FILE_ERROR.ABORT", "TRUE"]);
-    assert_eq!(project.text("a"), "DCBA");
+    assert_eq!(project.text("a"), "HGFE");
 }

@@ -47,6 +47,12 @@ pub enum Request {
         /// Whether the folders it lies in are made too.
         parents: bool,
     },
+    /// Asks for the name, in the order of bytes, that follows the one in the buffer in a folder of `data/`; it comes back in the buffer, a folder's with a `/`
+    /// behind it, nothing if there is none. Names that are not UTF-8 or longer than 255 bytes are passed over.
+    Next {
+        /// Relative path, UTF-8; `.` is `data` itself.
+        path: crate::Str<256>,
+    },
     /// Asks for the size of a file in `data/`.
     Size {
         /// Relative path, UTF-8.

@@ -4,6 +4,7 @@
 //! `nc/` or `data/` of the project ([`confine`]); only files in `data/` are written.
 
 pub mod confine;
+mod list;
 mod service;
 mod write;
 

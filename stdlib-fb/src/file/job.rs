@@ -38,7 +38,8 @@ impl Job {
 
     /// Asks what `request` says, with the buffer, until there is an answer.
     pub fn run(&mut self, host: &mut dyn Host, request: impl FnOnce() -> Request) -> Option<Result<Chunk, HostError>> {
-        if self.stale && !self.drained(host) {
+        if self.stale {
+            self.drain(host);
             return None;
         }
         let Some(ticket) = self.ticket else {
@@ -56,14 +57,13 @@ impl Job {
         Some(answer)
     }
 
-    /// Whether the answer to the abandoned request has come.
-    fn drained(&mut self, host: &mut dyn Host) -> bool {
-        let Some(answer) = self.ticket.and_then(|ticket| host.take(ticket)) else { return self.ticket.is_none() };
+    /// Takes the answer to the abandoned request, if it has come. The next request is asked in the next call, with a buffer of its own.
+    fn drain(&mut self, host: &mut dyn Host) {
+        let Some(answer) = self.ticket.and_then(|ticket| host.take(ticket)) else { return };
         (self.ticket, self.stale) = (None, false);
         if let Ok(chunk) = answer {
             self.give_back(chunk.data);
         }
-        true
     }
 
     /// Keeps the buffer of an answer for the next request.

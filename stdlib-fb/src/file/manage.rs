@@ -1,4 +1,4 @@
-//! FILE.GetPos, SetPos, EOF, Flush, GetSize, Delete, Rename, DirCreate: what is neither opening nor moving bytes.
+//! FILE.GetPos, SetPos, EOF, Flush, GetSize, Delete, Rename: what is neither opening nor moving bytes.
 
 use super::FileError;
 use super::job::Job;
@@ -7,7 +7,7 @@ use super::trigger::{Action, Step, file_block, pins};
 use takt_abi::{Bool, Cx, Env, Fault, Lword, Request, Str};
 
 /// Runs the job of the instance; `answered` is told the size of the file.
-fn run(cx: &mut Cx<'_>, request: impl FnOnce() -> Request, answered: impl FnOnce(u64)) -> Result<Step, Fault> {
+pub(super) fn run(cx: &mut Cx<'_>, request: impl FnOnce() -> Request, answered: impl FnOnce(u64)) -> Result<Step, Fault> {
     let Some(own) = cx.own() else { return Ok(Step::Over(FileError::HANDLE_INVALID)) };
     let Env { resources, host, .. } = &mut *cx.env;
     let Some(job) = resources.get::<Job>(own) else { return Err(Fault::Panic) };
@@ -27,7 +27,8 @@ fn path(cx: &mut Cx<'_>, handle: Lword) -> Option<Str<256>> {
     file(&mut cx.env.resources, handle).map(|f| f.path)
 }
 
-fn named(name: &Str<256>) -> Step {
+/// A name that is not empty.
+pub(super) fn named(name: &Str<256>) -> Step {
     if name.bytes().is_empty() { Step::Over(FileError::WRONG_PARAMETER) } else { Step::Busy }
 }
 
@@ -217,29 +218,5 @@ impl Action for FileRename {
             job.give_back(buffer);
         }
         run(cx, || Request::Rename { path }, drop)
-    }
-}
-
-file_block! {
-    /// `FILE.DirCreate` of CODESYS' CAA File: makes a folder.
-    FILE_DirCreate as FileDirCreate ["FILE.DirCreate"] resource Job;
-    input {
-        /// The folder, relative to `data`.
-        sDirName: Str<256>,
-        /// The folders it lies in are made too.
-        xParent: Bool
-    }
-    output {}
-    state {}
-}
-
-impl Action for FileDirCreate {
-    pins!();
-    fn begin(&mut self, _: &mut Cx<'_>) -> Result<Step, Fault> {
-        Ok(named(&self.sDirName))
-    }
-    fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
-        let (path, parents) = (self.sDirName, self.xParent.get());
-        run(cx, || Request::CreateFolder { path, parents }, drop)
     }
 }

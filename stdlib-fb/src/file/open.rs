@@ -5,6 +5,9 @@ use super::trigger::{Action, Step, file_block, pins};
 use super::{FileError, FileMode};
 use takt_abi::{Bool, Cx, Env, Fault, Handle, Lword, Plain, Request, Resource, Resources, Str};
 
+/// The mode of an open folder.
+pub(super) const FOLDER: FileMode = FileMode(-1);
+
 /// Files that one FILE.Open holds open at the most.
 const FILES: usize = 8;
 
@@ -138,30 +141,52 @@ impl Action for FileOpen {
         Ok(if known && !self.sFileName.bytes().is_empty() { Step::Busy } else { Step::Over(FileError::WRONG_PARAMETER) })
     }
     fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
-        let Some(own) = cx.own() else { return Ok(Step::Over(FileError::HANDLE_INVALID)) };
-        let Env { resources, host, .. } = &mut *cx.env;
-        let Some(opener) = resources.get::<Opener>(own) else { return Err(Fault::Panic) };
         let (path, mode) = (self.sFileName, self.eFileMode);
         let request = || match mode {
             FileMode::MREAD | FileMode::MREADPLUS => Request::Size { path },
             FileMode::MAPPD | FileMode::MAPPDPLUS => Request::Create { path, keep: true },
             _ => Request::Create { path, keep: false },
         };
-        let Some(answer) = opener.job.run(host.as_mut(), request) else { return Ok(Step::Busy) };
-        Ok(Step::Over(match answer {
-            Err(error) => error.into(),
-            Ok(chunk) => {
-                opener.job.give_back(chunk.data);
-                let appends = matches!(mode, FileMode::MAPPD | FileMode::MAPPDPLUS);
-                match opener.add(path, mode, if appends { chunk.file_size } else { 0 }) {
-                    Some(id) => {
-                        self.hFile = join(own, id);
-                        FileError::NO_ERROR
-                    }
-                    None => FileError::ASM_CREATEJOB_FAILED,
-                }
-            }
-        }))
+        answered(cx, path, mode, request, &mut self.hFile)
+    }
+}
+
+/// Puts a file or folder into the table of the instance when the host has answered well.
+pub(super) fn answered(
+    cx: &mut Cx<'_>,
+    path: Str<256>,
+    mode: FileMode,
+    request: impl FnOnce() -> Request,
+    handle: &mut Lword,
+) -> Result<Step, Fault> {
+    let Some(own) = cx.own() else { return Ok(Step::Over(FileError::HANDLE_INVALID)) };
+    let Env { resources, host, .. } = &mut *cx.env;
+    let Some(opener) = resources.get::<Opener>(own) else { return Err(Fault::Panic) };
+    let chunk = match opener.job.run(host.as_mut(), request) {
+        None => return Ok(Step::Busy),
+        Some(Err(error)) => return Ok(Step::Over(error.into())),
+        Some(Ok(chunk)) => chunk,
+    };
+    let mut buffer = chunk.data;
+    buffer.clear();
+    opener.job.give_back(buffer);
+    let appends = matches!(mode, FileMode::MAPPD | FileMode::MAPPDPLUS);
+    let Some(id) = opener.add(path, mode, if appends { chunk.file_size } else { 0 }) else {
+        return Ok(Step::Over(FileError::ASM_CREATEJOB_FAILED));
+    };
+    *handle = join(own, id);
+    Ok(Step::Over(FileError::NO_ERROR))
+}
+
+/// Takes what `handle` names out of its table.
+pub(super) fn close(cx: &mut Cx<'_>, handle: Lword) -> FileError {
+    let (handle, id) = split(handle);
+    match cx.env.resources.get::<Opener>(handle).and_then(|opener| opener.place(id)) {
+        Some(place) => {
+            *place = None;
+            FileError::NO_ERROR
+        }
+        None => FileError::HANDLE_INVALID,
     }
 }
 
@@ -179,15 +204,7 @@ file_block! {
 impl Action for FileClose {
     pins!();
     fn begin(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
-        let (handle, id) = split(self.hFile);
-        let place = cx.env.resources.get::<Opener>(handle).and_then(|opener| opener.place(id));
-        Ok(Step::Over(match place {
-            Some(place) => {
-                *place = None;
-                FileError::NO_ERROR
-            }
-            None => FileError::HANDLE_INVALID,
-        }))
+        Ok(Step::Over(close(cx, self.hFile)))
     }
     fn step(&mut self, _: &mut Cx<'_>) -> Result<Step, Fault> {
         Ok(Step::Busy)

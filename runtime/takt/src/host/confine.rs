@@ -10,8 +10,9 @@ use takt_abi::HostError;
 /// Links followed in one path.
 const LINKS: u32 = 16;
 
-/// The file that `path` names inside `folder`, free of links. It need not be a file, and its last component need not exist.
+/// The file that `path` names inside `folder`, free of links. It need not be a file. A `./` before it means nothing.
 pub fn resolve(folder: &Path, path: &str) -> Result<PathBuf, HostError> {
+    let path = path.strip_prefix("./").unwrap_or(path);
     let plain = !path.is_empty() && !path.contains(['\\', '\0']);
     let normal = Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
     if !plain || !normal {
@@ -25,6 +26,7 @@ pub fn resolve(folder: &Path, path: &str) -> Result<PathBuf, HostError> {
 
 /// The same for a name that nothing need have yet; its folder must exist.
 pub fn resolve_new(folder: &Path, path: &str) -> Result<PathBuf, HostError> {
+    let path = path.strip_prefix("./").unwrap_or(path);
     match resolve(folder, path) {
         Err(HostError::NotFound) => {}
         known => return known,
@@ -141,6 +143,7 @@ mod tests {
         for path in ["", "../secret", "sub/../../secret", "/etc/passwd", "sub/..", "..", "C:\\x", "sub\\a", "./../secret"] {
             tree.check(path, Err(HostError::Outside));
         }
+        tree.check("./a", Ok("a")).check("././a", Err(HostError::Outside));
         tree.check("a", Ok("a")).check("sub", Ok("sub")).check("none", Err(HostError::NotFound));
     }
 

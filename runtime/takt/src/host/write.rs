@@ -9,7 +9,7 @@ use takt_abi::{HostError, Request};
 /// Does what a request asks, in the folder `data`; the size of the file afterwards.
 pub(super) fn serve(data: &Path, request: Request, bytes: &[u8]) -> Result<u64, HostError> {
     match request {
-        Request::Read { .. } => Err(HostError::NotReadable),
+        Request::Read { .. } | Request::Next { .. } => Err(HostError::NotReadable),
         Request::Write { path, offset } => write(data, &path.to_text(), offset, bytes),
         Request::Create { path, keep } => create(data, &path.to_text(), keep),
         Request::CreateFolder { path, parents } => create_folder(data, &path.to_text(), parents),
@@ -175,7 +175,7 @@ mod tests {
         std::fs::create_dir_all(folder.0.join("data/sub")).unwrap();
         std::fs::write(folder.0.join("secret"), "s").unwrap();
         std::fs::write(folder.0.join("data/own"), "o").unwrap();
-        for name in ["../secret", "/tmp/x", "sub/../../secret", "", "a\\b"] {
+        for name in ["../secret", "/x", "sub/../../secret", "", "a\\b"] {
             let path = Str::new(name);
             assert_eq!(folder.ask(Request::Create { path, keep: false }, b""), Err(HostError::Outside), "{name}");
             assert_eq!(folder.ask(Request::Write { path, offset: None }, b"x"), Err(HostError::Outside), "{name}");
