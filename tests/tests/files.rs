@@ -263,7 +263,7 @@ op(xExecute := TRUE, sFileName := 'a', eFileMode := FILE.MODE.MWRITE);
 IF op.xDone THEN
     n := n + 1;
     IF n = 4 THEN x := 16#45464748; END_IF
-    wr(xExecute := n <> 4, xAbort := n = 2, hFile := op.hFile, pBuffer := ADR(x), szSize := 4);
+    wr(xExecute := n <> 4, xAbort := n = 2, hFile := op.hFile, pBuffer := ADR(x), szSize := SEL(wr.xBusy, 4, 8));
     IF n = 2 THEN aborted := wr.xAborted AND NOT wr.xError; code := wr.eError; END_IF
 END_IF
 END_PROGRAM";

@@ -41,7 +41,7 @@ file_block! {
         udiTimeOut: u32,
         /// The file.
         hFile: Lword,
-        /// Where the bytes go; keep it while `xBusy`.
+        /// Where the bytes go, from the rise of `xExecute` on.
         pBuffer: u64,
         /// How many fit.
         szBuffer: u64
@@ -52,16 +52,16 @@ file_block! {
         /// Bytes read; fewer than `szBuffer` at the end of the file.
         szSize: u64
     }
-    state { moved: u64, started: i64 }
+    state { buffer: u64, size: u64, moved: u64, started: i64 }
 }
 
 impl FileRead {
     /// One answer of the host.
     fn receive(&mut self, cx: &mut Cx<'_>, open: OpenFile, data: &[u8]) -> Result<Step, Fault> {
-        let wanted = usize::try_from(self.szBuffer.saturating_sub(self.moved)).unwrap_or(usize::MAX);
+        let wanted = usize::try_from(self.size.saturating_sub(self.moved)).unwrap_or(usize::MAX);
         let length = data.len().min(wanted);
         if length > 0 {
-            let to = self.pBuffer.checked_add(self.moved).ok_or(Fault::WildPointer { offset: self.pBuffer, size: self.szBuffer })?;
+            let to = self.buffer.checked_add(self.moved).ok_or(Fault::WildPointer { offset: self.buffer, size: self.size })?;
             cx.bytes_mut(to, length)?.copy_from_slice(&data[..length]);
             *cx.fuel = cx.fuel.saturating_sub(length as i64 / FUEL_BYTES);
         }
@@ -69,7 +69,7 @@ impl FileRead {
         if let Some(file) = file(&mut cx.env.resources, self.hFile) {
             file.position = open.position + length as u64;
         }
-        if data.len() < CHUNK || self.moved >= self.szBuffer {
+        if data.len() < CHUNK || self.moved >= self.size {
             self.szSize = self.moved;
             return Ok(Step::Over(FileError::NO_ERROR));
         }
@@ -84,9 +84,10 @@ impl Action for FileRead {
     }
     fn begin(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
         (self.moved, self.started) = (0, cx.now.0);
-        if self.szBuffer > 0 {
-            let size = usize::try_from(self.szBuffer).map_err(|_| Fault::WildPointer { offset: self.pBuffer, size: self.szBuffer })?;
-            cx.bytes(self.pBuffer, size)?;
+        (self.buffer, self.size) = (self.pBuffer, self.szBuffer);
+        if self.size > 0 {
+            let size = usize::try_from(self.size).map_err(|_| Fault::WildPointer { offset: self.buffer, size: self.size })?;
+            cx.bytes(self.buffer, size)?;
         }
         Ok(Step::Busy)
     }
@@ -131,7 +132,7 @@ file_block! {
         udiTimeOut: u32,
         /// The file.
         hFile: Lword,
-        /// Where the bytes are; keep them while `xBusy`.
+        /// Where the bytes are; do not change them while `xBusy`.
         pBuffer: u64,
         /// How many.
         szSize: u64
@@ -140,14 +141,14 @@ file_block! {
         /// `xAbort` ended it.
         xAborted: Bool
     }
-    state { moved: u64, started: i64 }
+    state { buffer: u64, size: u64, moved: u64, started: i64 }
 }
 
 impl FileWrite {
     /// Puts the bytes of the next request into the job's buffer.
     fn fill(&self, cx: &mut Cx<'_>, own: Handle) -> Result<(), Fault> {
-        let length = self.szSize.saturating_sub(self.moved).min(CHUNK as u64) as usize;
-        let from = self.pBuffer.checked_add(self.moved).ok_or(Fault::WildPointer { offset: self.pBuffer, size: self.szSize })?;
+        let length = self.size.saturating_sub(self.moved).min(CHUNK as u64) as usize;
+        let from = self.buffer.checked_add(self.moved).ok_or(Fault::WildPointer { offset: self.buffer, size: self.size })?;
         cx.bytes(from, length)?;
         let mut buffer = job(cx.env, own).map(Job::buffer).unwrap_or_default();
         buffer.extend_from_slice(cx.bytes(from, length)?);
@@ -166,9 +167,10 @@ impl Action for FileWrite {
     }
     fn begin(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
         (self.moved, self.started) = (0, cx.now.0);
-        if self.szSize > 0 {
-            let size = usize::try_from(self.szSize).map_err(|_| Fault::WildPointer { offset: self.pBuffer, size: self.szSize })?;
-            cx.bytes(self.pBuffer, size)?;
+        (self.buffer, self.size) = (self.pBuffer, self.szSize);
+        if self.size > 0 {
+            let size = usize::try_from(self.size).map_err(|_| Fault::WildPointer { offset: self.buffer, size: self.size })?;
+            cx.bytes(self.buffer, size)?;
         }
         Ok(Step::Busy)
     }
@@ -185,7 +187,7 @@ impl Action for FileWrite {
         if !open.writes() {
             return Ok(Step::Over(FileError::WRONG_PARAMETER));
         }
-        if self.moved >= self.szSize {
+        if self.moved >= self.size {
             return Ok(Step::Over(FileError::NO_ERROR));
         }
         if job(cx.env, own).is_some_and(|job| job.is_idle()) {
