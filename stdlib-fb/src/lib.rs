@@ -4,6 +4,7 @@
 //! it; a block in Rust is one declaration that holds its fields, its documentation and its body. No block knows the compiler, the engine or a bus.
 
 pub mod cnc;
+pub mod file;
 pub mod motion;
 pub mod standard;
 
@@ -19,10 +20,18 @@ pub static LIBRARY: Library = Library {
     aliases: &ALIASES,
     sources: &[
         ("counters.st", include_str!("../st/counters.st")),
+        ("dates.st", include_str!("../st/dates.st")),
         ("edges.st", include_str!("../st/edges.st")),
         ("latches.st", include_str!("../st/latches.st")),
         ("system.st", include_str!("../st/system.st")),
         ("timers.st", include_str!("../st/timers.st")),
+        ("types.st", include_str!("../st/types.st")),
+        ("util_bits.st", include_str!("../st/util_bits.st")),
+        ("util_codes.st", include_str!("../st/util_codes.st")),
+        ("util_controllers.st", include_str!("../st/util_controllers.st")),
+        ("util_functions.st", include_str!("../st/util_functions.st")),
+        ("util_math.st", include_str!("../st/util_math.st")),
+        ("util_signals.st", include_str!("../st/util_signals.st")),
     ],
 };
 
@@ -34,20 +43,49 @@ const SHARED_ALIASES: &[(&str, &str)] = &[
     ("SMC_VIRTUAL_AXIS", "AXIS_REF_SM3"),
     // The CODESYS libraries whose names programs write before a block's.
     ("Standard", "Takt"),
+    ("Standard64", "Takt"),
     ("Util", "Takt"),
+    ("Tc2_Standard", "Takt"),
+    ("Tc2_System", "Takt"),
+    ("Tc2_Utilities", "Takt"),
+    ("Tc2_Math", "Takt"),
     ("SM3_Basic", "Takt"),
     ("SM3_CNC", "Takt"),
     ("__SYSTEM", "Takt"),
 ];
 
-static BLOCKS: [&BlockDesc; cnc::BLOCKS.len() + motion::BLOCKS.len()] = join(&[cnc::BLOCKS, motion::BLOCKS]);
-static FUNCTIONS: [&FnDesc; cnc::FUNCTIONS.len() + motion::FUNCTIONS.len() + standard::FUNCTIONS.len()] =
-    join(&[cnc::FUNCTIONS, motion::FUNCTIONS, standard::FUNCTIONS]);
-static STRUCTS: [&StructDesc; SHARED_STRUCTS.len() + cnc::STRUCTS.len() + motion::STRUCTS.len()] =
-    join(&[SHARED_STRUCTS, cnc::STRUCTS, motion::STRUCTS]);
-static ENUMS: [&EnumDesc; SHARED_ENUMS.len() + cnc::ENUMS.len() + motion::ENUMS.len()] = join(&[SHARED_ENUMS, cnc::ENUMS, motion::ENUMS]);
-static ALIASES: [(&str, &str); SHARED_ALIASES.len() + cnc::ALIASES.len() + motion::ALIASES.len()] =
-    join(&[SHARED_ALIASES, cnc::ALIASES, motion::ALIASES]);
+const BLOCK_TABLES: &[&[&BlockDesc]] = &[cnc::BLOCKS, file::BLOCKS, motion::BLOCKS, standard::counters::BLOCKS];
+const FUNCTION_TABLES: &[&[&FnDesc]] = &[
+    cnc::FUNCTIONS,
+    motion::FUNCTIONS,
+    standard::clock::FUNCTIONS,
+    standard::date::FUNCTIONS,
+    standard::decimal::FUNCTIONS,
+    standard::format::FUNCTIONS,
+    standard::memory::FUNCTIONS,
+    standard::number::FUNCTIONS,
+    standard::parse::FUNCTIONS,
+    standard::text::FUNCTIONS,
+];
+const ALIAS_TABLES: &[&[(&str, &str)]] = &[SHARED_ALIASES, cnc::ALIASES, file::ALIASES, motion::ALIASES, standard::memory::ALIASES];
+
+static BLOCKS: [&BlockDesc; total(BLOCK_TABLES)] = join(BLOCK_TABLES);
+static FUNCTIONS: [&FnDesc; total(FUNCTION_TABLES)] = join(FUNCTION_TABLES);
+const STRUCT_TABLES: &[&[&StructDesc]] = &[SHARED_STRUCTS, cnc::STRUCTS, file::STRUCTS, motion::STRUCTS];
+static STRUCTS: [&StructDesc; total(STRUCT_TABLES)] = join(STRUCT_TABLES);
+const ENUM_TABLES: &[&[&EnumDesc]] = &[SHARED_ENUMS, cnc::ENUMS, file::ENUMS, motion::ENUMS];
+static ENUMS: [&EnumDesc; total(ENUM_TABLES)] = join(ENUM_TABLES);
+static ALIASES: [(&str, &str); total(ALIAS_TABLES)] = join(ALIAS_TABLES);
+
+/// How many entries the tables have together.
+const fn total<T>(parts: &[&[T]]) -> usize {
+    let (mut sum, mut part) = (0, 0);
+    while part < parts.len() {
+        sum += parts[part].len();
+        part += 1;
+    }
+    sum
+}
 
 /// The tables of the topics, one after the other. `N` is the sum of their lengths.
 const fn join<T: Copy, const N: usize>(parts: &[&[T]]) -> [T; N] {

@@ -74,7 +74,22 @@ macro_rules! wrapped_arg {
         }
     )*};
 }
-wrapped_arg!(Byte, Word, Dword, Lword, StTime, StDate, StTimeOfDay, StDateTime, StLtime);
+wrapped_arg!(
+    Byte,
+    Word,
+    Dword,
+    Lword,
+    StTime,
+    StDate,
+    StTimeOfDay,
+    StDateTime,
+    StLtime,
+    StLdate,
+    StLtimeOfDay,
+    StLdateTime,
+    StChar,
+    StWchar
+);
 
 impl Arg for f64 {
     fn take(_: &Cx<'_>, word: u64) -> Result<Self, Fault> {
@@ -108,15 +123,18 @@ impl<T> Arg for crate::Ptr<T> {
         Ok(self.0)
     }
 }
-impl<const N: usize> Arg for crate::Str<N> {
-    fn take(cx: &Cx<'_>, word: u64) -> Result<Self, Fault> {
-        cx.load(word)
-    }
-    fn give(self, cx: &mut Cx<'_>, place: u64) -> Result<u64, Fault> {
-        cx.store(place, &self)?;
-        Ok(0)
-    }
+macro_rules! text_arg {
+    ($($ty:ident),*) => {$(
+        impl<const N: usize> Arg for crate::$ty<N> {
+            fn take(cx: &Cx<'_>, word: u64) -> Result<Self, Fault> { cx.load(word) }
+            fn give(self, cx: &mut Cx<'_>, place: u64) -> Result<u64, Fault> {
+                cx.store(place, &self)?;
+                Ok(0)
+            }
+        }
+    )*};
 }
+text_arg!(Str, WStr);
 
 /// Declares a STRUCT: the Rust type (`repr(C)`, [`Plain`]) and `Self::DESC`.
 ///
@@ -198,6 +216,18 @@ macro_rules! st_plain {
     };
 }
 
+/// Whether the members of a [`st_enum!`] need its name.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! st_qualified {
+    () => {
+        false
+    };
+    (qualified_only) => {
+        true
+    };
+}
+
 /// The initial value of a field.
 #[doc(hidden)]
 #[macro_export]
@@ -210,7 +240,8 @@ macro_rules! st_init {
     };
 }
 
-/// Declares an enumeration: a newtype over its base (any bit pattern is valid) with a constant per member, and `Self::DESC`.
+/// Declares an enumeration: a newtype over its base (any bit pattern is valid) with a constant per member, and `Self::DESC`. With `qualified_only`
+/// behind its base its members resolve only as `TYPE.member`.
 ///
 /// ```
 /// takt_abi::st_enum! {
@@ -221,7 +252,7 @@ macro_rules! st_init {
 /// ```
 #[macro_export]
 macro_rules! st_enum {
-    ($(#[doc = $doc:literal])* pub enum $st:ident as $rust:ident($base:ty, $elem:ident) { $($(#[doc = $mdoc:literal])* $member:ident = $value:expr),* $(,)? }) => {
+    ($(#[doc = $doc:literal])* pub enum $st:ident as $rust:ident($base:ty, $elem:ident $(, $only:ident)?) { $($(#[doc = $mdoc:literal])* $member:ident = $value:expr),* $(,)? }) => {
         $(#[doc = $doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
         #[repr(transparent)]
@@ -235,6 +266,7 @@ macro_rules! st_enum {
                 doc: concat!($($doc, "\n",)*),
                 base: $crate::Elem::$elem,
                 members: &[$((stringify!($member), $value as i64),)*],
+                qualified_only: $crate::st_qualified!($($only)?),
             };
         }
         impl $crate::Plain for $rust {

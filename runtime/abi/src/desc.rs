@@ -43,6 +43,8 @@ pub enum FieldType {
     Elem(Elem),
     /// STRING(n): n+1 bytes.
     String(u32),
+    /// WSTRING(n): n+1 units of 16 bits.
+    WString(u32),
     /// ARRAY[low..high] OF elem.
     Array {
         /// Element type.
@@ -107,7 +109,7 @@ pub struct StructDesc {
     pub init: fn(&mut [u8]),
 }
 
-/// An enumeration; its members resolve without qualifier.
+/// An enumeration; its members resolve without qualifier unless it says otherwise.
 #[derive(Debug, Clone, Copy)]
 pub struct EnumDesc {
     /// ST name.
@@ -118,6 +120,8 @@ pub struct EnumDesc {
     pub base: Elem,
     /// Members and values.
     pub members: &'static [(&'static str, i64)],
+    /// Members resolve only behind the name of the type.
+    pub qualified_only: bool,
 }
 
 /// What compiled code calls: context, arguments (and place of the result); 0 or the code of the fault, whose facts are then in the context.

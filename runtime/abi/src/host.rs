@@ -1,4 +1,4 @@
-//! The world outside a scan: files, read in chunks by a service that `takt` implements.
+//! The world outside a scan: files, read and written in chunks by a service that `takt` implements. Requests are served in the order they were made.
 //!
 //! A request leaves in one scan; its completion is latched at the start of a later scan (in simulation: the next). No scan waits for a disk.
 
@@ -26,6 +26,53 @@ pub enum Request {
         /// First byte.
         offset: u64,
     },
+    /// Writes the bytes of the buffer to a file in `data/` that exists.
+    Write {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+        /// Where the first byte goes; `None`: behind the last.
+        offset: Option<u64>,
+    },
+    /// Makes an empty file in `data/`.
+    Create {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+        /// Whether a file that exists keeps its content.
+        keep: bool,
+    },
+    /// Makes a folder in `data/`.
+    CreateFolder {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+        /// Whether the folders it lies in are made too.
+        parents: bool,
+    },
+    /// Asks for the name, in the order of bytes, that follows the one in the buffer in a folder of `data/`; it comes back in the buffer, a folder's with a `/`
+    /// behind it, nothing if there is none. Names that are not UTF-8 or longer than 255 bytes are passed over.
+    Next {
+        /// Relative path, UTF-8; `.` is `data` itself.
+        path: crate::Str<256>,
+    },
+    /// Asks for the size of a file in `data/`.
+    Size {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+    },
+    /// Puts what was written to a file in `data/` on the disk.
+    Sync {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+    },
+    /// Deletes a file in `data/`.
+    Delete {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+    },
+    /// Gives a file in `data/` the path in the buffer, which nothing there has yet.
+    Rename {
+        /// Relative path, UTF-8.
+        path: crate::Str<256>,
+    },
 }
 
 /// Names a request.
@@ -41,6 +88,10 @@ pub enum HostError {
     Outside,
     /// A folder, device or unreadable file.
     NotReadable,
+    /// A file that may not be written.
+    NotWritable,
+    /// There is a file of that name already.
+    Exists,
     /// The operating system reported this error number.
     Os(i32),
     /// Too many requests under way; ask again in the next scan.
@@ -49,12 +100,12 @@ pub enum HostError {
     Absent,
 }
 
-/// What a read brought.
+/// What a request brought.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Chunk {
-    /// The bytes; fewer than [`CHUNK`] only at the end of the file.
+    /// The bytes that were read; fewer than [`CHUNK`] only at the end of the file. For other requests the buffer that was given.
     pub data: Vec<u8>,
-    /// Size of the file in bytes.
+    /// Size of the file in bytes afterwards.
     pub file_size: u64,
 }
 

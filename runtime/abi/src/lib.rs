@@ -26,7 +26,10 @@ pub use desc::{BlockDesc, Elem, EnumDesc, FieldDesc, FieldType, FnDesc, Library,
 pub use fault::Fault;
 pub use heap::Heap;
 pub use host::{CHUNK, Chunk, Folder, Host, HostError, NoHost, Request, Ticket};
-pub use plain::{Bool, Byte, Dword, InOut, Lword, OpenArray, Plain, Ptr, StDate, StDateTime, StLtime, StTime, StTimeOfDay, Str, Word};
+pub use plain::{
+    Bool, Byte, Dword, InOut, Lword, OpenArray, Plain, Ptr, StChar, StDate, StDateTime, StLdate, StLdateTime, StLtime, StLtimeOfDay,
+    StTime, StTimeOfDay, StWchar, Str, WStr, Word,
+};
 pub use resource::{Handle, Resource, Resources};
 
 /// A point or span of machine time in nanoseconds.

@@ -72,6 +72,16 @@ wrapper! {
     StDateTime(u32) => Dt;
     /// LTIME: nanoseconds in 64 bits.
     StLtime(i64) => Ltime;
+    /// LDATE: nanoseconds since 1970 in 64 bits.
+    StLdate(u64) => Ldate;
+    /// LTIME_OF_DAY: nanoseconds since midnight in 64 bits.
+    StLtimeOfDay(u64) => Ltod;
+    /// LDATE_AND_TIME: nanoseconds since 1970 in 64 bits.
+    StLdateTime(u64) => Ldt;
+    /// CHAR.
+    StChar(u8) => Char;
+    /// WCHAR.
+    StWchar(u16) => Wchar;
 }
 
 /// BOOL: TRUE when the byte is not 0.
@@ -163,6 +173,38 @@ impl<const N: usize> Plain for Str<N> {
 impl<const N: usize> std::fmt::Debug for Str<N> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:?}", self.to_text())
+    }
+}
+
+/// WSTRING(N-1): `N` units of 16 bits, NUL-terminated. `WStr<256>` is WSTRING(255).
+#[derive(Clone, Copy, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct WStr<const N: usize>(pub [u16; N]);
+
+impl<const N: usize> WStr<N> {
+    /// The empty string.
+    pub const EMPTY: Self = Self([0; N]);
+    /// The units before the first NUL (at most `N - 1`).
+    pub fn units(&self) -> &[u16] {
+        let end = self.0[..N - 1].iter().position(|u| *u == 0).unwrap_or(N - 1);
+        &self.0[..end]
+    }
+}
+impl<const N: usize> Plain for WStr<N> {
+    const TYPE: FieldType = FieldType::WString(N as u32 - 1);
+    const INIT: Self = Self([0; N]);
+    fn load(bytes: &[u8]) -> Self {
+        Self(std::array::from_fn(|i| u16::load(&bytes[2 * i..])))
+    }
+    fn store(&self, bytes: &mut [u8]) {
+        for (i, unit) in self.0.iter().enumerate() {
+            unit.store(&mut bytes[2 * i..]);
+        }
+    }
+}
+impl<const N: usize> std::fmt::Debug for WStr<N> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", String::from_utf16_lossy(self.units()))
     }
 }
 

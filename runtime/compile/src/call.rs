@@ -527,6 +527,9 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     pub(crate) fn call_native(&mut self, desc: &'static FnDesc, args: &'a [Arg], span: Span) -> Operand {
+        if let Some(result) = self.overloaded(desc, args, span) {
+            return result;
+        }
         let names: Vec<(&str, Section)> = desc.params.iter().map(|p| (p.name, Section::Input)).collect();
         let enable = self.enable(&names, args);
         let matched = self.match_arguments(desc.name, &names, args);

@@ -578,14 +578,17 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 }
             },
             Thing::Type(ty) => self.enumerator(ty, member),
-            Thing::Space(space) => match self.c.item_in(space, &member.text) {
-                Some(item) => self.item(item, &member.text, span),
-                None => {
-                    let what = if let Item::Library = space { "library" } else { "namespace" };
-                    self.report(Code::UnknownMember, member.span, format!("the {what} has no `{}`", member.text));
-                    Thing::Error
+            Thing::Space(space) => {
+                let library = if let ExprKind::Name(library) = &base.kind { library } else { "" };
+                match self.c.item_in(space, library, &member.text) {
+                    Some(item) => self.item(item, &member.text, span),
+                    None => {
+                        let what = if let Item::Library = space { "library" } else { "namespace" };
+                        self.report(Code::UnknownMember, member.span, format!("the {what} has no `{}`", member.text));
+                        Thing::Error
+                    }
                 }
-            },
+            }
             Thing::Error => Thing::Error,
             Thing::Function(_) | Thing::Native(_) | Thing::Member(_) => {
                 self.report(Code::UnknownMember, member.span, format!("a function has no member `{}`", member.text));

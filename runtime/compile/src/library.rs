@@ -13,7 +13,8 @@ impl Compiler<'_> {
             for desc in library.enums {
                 let ty = self.native_type(&FieldType::Enum(desc));
                 self.add_native(desc.name, Item::Ready(ty));
-                for (member, value) in desc.members {
+                let bare = if desc.qualified_only { &[] } else { desc.members };
+                for (member, value) in bare {
                     self.add_native(member, Item::Enumerator(ty, *value));
                 }
             }
@@ -39,6 +40,12 @@ impl Compiler<'_> {
         }
     }
 
+    /// What `library.name` means: a name that the library has only there (`MEM.MemMove`), else one of all libraries.
+    pub(crate) fn library_member(&self, library: &str, name: &str) -> Option<Item> {
+        let own = self.library_names.get(&key(&format!("{library}.{name}")));
+        own.or_else(|| self.library_names.get(&key(name))).copied()
+    }
+
     fn add_native(&mut self, name: &str, item: Item) {
         self.library_names.entry(key(name)).or_insert(item);
     }
@@ -48,6 +55,7 @@ impl Compiler<'_> {
         match field {
             FieldType::Elem(e) => self.types.intern(Type::Elem(*e)),
             FieldType::String(n) => self.types.intern(Type::String(*n)),
+            FieldType::WString(n) => self.types.intern(Type::WString(*n)),
             FieldType::Array { elem, low, high } => {
                 let elem = self.native_type(elem);
                 self.types.intern(Type::Array { elem, dims: vec![(*low, *high)] })

@@ -55,19 +55,21 @@ impl<'a> Compiler<'a> {
         self.namespaces.iter().position(|known| known == full).map(Item::Namespace)
     }
 
-    /// What `item.name` means, if `item` is a namespace or library.
-    pub(crate) fn item_in(&self, item: Item, name: &str) -> Option<Item> {
+    /// What `item.name` means, if `item` is a namespace or the library that is called `library`.
+    pub(crate) fn item_in(&self, item: Item, library: &str, name: &str) -> Option<Item> {
         match item {
             Item::Namespace(space) => self.in_namespace(&self.namespaces[space], &key(name)),
-            Item::Library => self.library_names.get(&key(name)).copied(),
+            Item::Library => self.library_member(library, name),
             _ => None,
         }
     }
 
     /// What a dotted name means.
     pub(crate) fn path_item<'n>(&self, mut parts: impl Iterator<Item = &'n str>) -> Option<Item> {
-        let first = self.global_name(parts.next()?)?;
-        parts.try_fold(first, |item, name| self.item_in(item, name))
+        let first = parts.next()?;
+        let (_, item) =
+            parts.try_fold((first, self.global_name(first)?), |(before, item), name| Some((name, self.item_in(item, before, name)?)))?;
+        Some(item)
     }
 
     /// Reports USING of what is no namespace.

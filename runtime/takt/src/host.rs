@@ -1,10 +1,12 @@
 //! Files for programs: [`takt_abi::Host`] over a service thread, so that no scan waits for a disk.
 //!
 //! Requests and completions go through bounded channels and buffers come back with the data, so that a scan allocates nothing. A path is confined to
-//! `nc/` or `data/` of the project ([`confine`]). Lacks: writing.
+//! `nc/` or `data/` of the project ([`confine`]); only files in `data/` are written.
 
 pub mod confine;
+mod list;
 mod service;
+mod write;
 
 use service::{Done, Job};
 use std::path::PathBuf;

@@ -126,7 +126,9 @@ impl From<HostError> for Kind {
             HostError::NotFound => Self::NotFound,
             HostError::Outside => Self::Outside,
             HostError::Os(code) => Self::NotReadable(code),
-            HostError::NotReadable | HostError::Busy | HostError::Absent => Self::NotReadable(0),
+            HostError::NotReadable | HostError::NotWritable | HostError::Exists | HostError::Busy | HostError::Absent => {
+                Self::NotReadable(0)
+            }
         }
     }
 }

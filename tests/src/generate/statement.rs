@@ -269,7 +269,13 @@ impl Generator {
     }
 
     /// `name := value` for the parameters, or the values alone where the order is known; `None` if a VAR_IN_OUT finds no variable.
-    pub(super) fn arguments(&mut self, inputs: &[(String, Shape)], in_outs: &[(String, Shape)], depth: usize, all: bool) -> Option<Vec<String>> {
+    pub(super) fn arguments(
+        &mut self,
+        inputs: &[(String, Shape)],
+        in_outs: &[(String, Shape)],
+        depth: usize,
+        all: bool,
+    ) -> Option<Vec<String>> {
         let mut arguments = Vec::new();
         for (name, shape) in inputs {
             if all || self.random.chance(70) {

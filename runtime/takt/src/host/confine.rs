@@ -3,15 +3,16 @@
 //! A path is walked component by component. A link is followed only if its target is relative and stays inside; `..`, absolute paths
 //! and backslashes are refused in what a program writes.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::path::{Component, Path, PathBuf};
 use takt_abi::HostError;
 
 /// Links followed in one path.
 const LINKS: u32 = 16;
 
-/// The file that `path` names inside `folder`, free of links. It need not be a file, and its last component need not exist.
+/// The file that `path` names inside `folder`, free of links. It need not be a file. A `./` before it means nothing.
 pub fn resolve(folder: &Path, path: &str) -> Result<PathBuf, HostError> {
+    let path = path.strip_prefix("./").unwrap_or(path);
     let plain = !path.is_empty() && !path.contains(['\\', '\0']);
     let normal = Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
     if !plain || !normal {
@@ -21,6 +22,23 @@ pub fn resolve(folder: &Path, path: &str) -> Result<PathBuf, HostError> {
     let mut walk = Walk { root: &root, at: root.clone(), links: 0 };
     walk.follow(Path::new(path))?;
     Ok(walk.at)
+}
+
+/// The same for a name that nothing need have yet; its folder must exist.
+pub fn resolve_new(folder: &Path, path: &str) -> Result<PathBuf, HostError> {
+    let path = path.strip_prefix("./").unwrap_or(path);
+    match resolve(folder, path) {
+        Err(HostError::NotFound) => {}
+        known => return known,
+    }
+    let parent = match path.rsplit_once('/') {
+        Some((parent, _)) => resolve(folder, parent)?,
+        None => folder.canonicalize().map_err(error)?,
+    };
+    let name = Path::new(path).file_name().ok_or(HostError::Outside)?;
+    let place = parent.join(name);
+    // A link that leads nowhere is not a new name: what it names may lie outside.
+    if std::fs::symlink_metadata(&place).is_ok() || !parent.is_dir() { Err(HostError::NotFound) } else { Ok(place) }
 }
 
 struct Walk<'a> {
@@ -62,8 +80,11 @@ impl Walk<'_> {
 
 /// Opens a plain file for reading; a folder, pipe or device is refused, a link too.
 pub fn open(path: &Path) -> Result<File, HostError> {
-    let mut options = File::options();
-    options.read(true);
+    open_as(path, File::options().read(true))
+}
+
+/// The same, as the options say.
+pub fn open_as(path: &Path, options: &mut OpenOptions) -> Result<File, HostError> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::OpenOptionsExt;
@@ -122,6 +143,7 @@ mod tests {
         for path in ["", "../secret", "sub/../../secret", "/etc/passwd", "sub/..", "..", "C:\\x", "sub\\a", "./../secret"] {
             tree.check(path, Err(HostError::Outside));
         }
+        tree.check("./a", Ok("a")).check("././a", Err(HostError::Outside));
         tree.check("a", Ok("a")).check("sub", Ok("sub")).check("none", Err(HostError::NotFound));
     }
 
@@ -134,6 +156,27 @@ mod tests {
             tree.check(path, Err(HostError::Outside));
         }
         tree.check("round", Err(HostError::NotReadable)).check("sub/up", Ok("a")).check("ok", Ok("a"));
+    }
+
+    #[test]
+    fn a_new_name_stays_inside() {
+        let tree = Tree::new("new");
+        tree.link("dangling", "../new").link("folder", "..").link("inner", "sub");
+        let root = tree.0.join("nc").canonicalize().unwrap();
+        let new = |path: &str| resolve_new(&tree.0.join("nc"), path).map(|p| p.strip_prefix(&root).unwrap().to_path_buf());
+        assert_eq!(new("fresh"), Ok(PathBuf::from("fresh")));
+        assert_eq!(new("inner/fresh"), Ok(PathBuf::from("sub/fresh")));
+        assert_eq!(new("a"), Ok(PathBuf::from("a")));
+        for (path, error) in [
+            ("dangling", HostError::Outside),
+            ("folder/fresh", HostError::Outside),
+            ("../fresh", HostError::Outside),
+            ("/fresh", HostError::Outside),
+            ("none/fresh", HostError::NotFound),
+            ("a/fresh", HostError::NotFound),
+        ] {
+            assert_eq!(new(path), Err(error), "{path}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! The thread that reads files.
+//! The thread that reads and writes files.
 
-use super::confine;
+use super::{confine, list, write};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -29,8 +29,11 @@ pub(super) struct Done {
 pub(super) fn serve(root: &Path, jobs: &Receiver<Job>, done: &SyncSender<Done>) {
     let mut cache = Cache { open: Vec::with_capacity(OPEN) };
     while let Ok(Job { ticket, request, buffer }) = jobs.recv() {
-        let Request::Read { folder, path, offset } = request;
-        let result = read(root, &mut cache, folder, &path.to_text(), offset, buffer);
+        let result = match request {
+            Request::Read { folder, path, offset } => read(root, &mut cache, folder, &path.to_text(), offset, buffer),
+            Request::Next { path } => list::next(&root.join("data"), &path.to_text(), buffer),
+            other => write::serve(&root.join("data"), other, &buffer).map(|file_size| Chunk { data: buffer, file_size }),
+        };
         if done.send(Done { ticket, result }).is_err() {
             return;
         }

@@ -34,7 +34,8 @@ impl Files {
         files.files.insert(name.into(), Content::Bytes(content.into()));
         files
     }
-    fn read(&self, Request::Read { path, offset, .. }: Request, mut data: Vec<u8>) -> Result<Chunk, HostError> {
+    fn read(&self, request: Request, mut data: Vec<u8>) -> Result<Chunk, HostError> {
+        let Request::Read { path, offset, .. } = request else { return Err(HostError::Absent) };
         let content = self.files.get(path.to_text().as_ref()).ok_or(HostError::NotFound)?;
         data.clear();
         let slice = |bytes: &[u8]| bytes[(offset as usize).min(bytes.len())..].iter().copied().take(CHUNK).collect::<Vec<_>>();
