@@ -266,8 +266,10 @@ impl<'a> Lowering<'_, 'a> {
 
     fn argument(&mut self, v: &Variable<'a>, arg: &'a Arg) -> Option<Vec<Local>> {
         let value = arg.value.as_ref()?;
-        match v.kind {
-            VarKind::InOut => self.by_reference(&v.name, v.ty, value),
+        match (v.kind, crate::any::generic(&v.decl.ty)) {
+            (VarKind::InOut, _) if v.constant => self.by_constant_reference(v, value),
+            (VarKind::InOut, _) => self.by_reference(&v.name, v.ty, value),
+            (_, Some(wanted)) if v.ty == self.c.any_type(value.span) => Some(vec![self.describe(wanted, value)?]),
             _ => {
                 let operand = match *self.c.types.get(v.ty) {
                     Type::Reference(to) => self.reference_argument(value, v.ty, to)?,
@@ -338,6 +340,32 @@ impl<'a> Lowering<'_, 'a> {
         }
         let place = self.variable_argument(name, ty, &operand)?;
         Some(vec![self.address(&place, self.c.types.size(ty))])
+    }
+
+    /// What a VAR_IN_OUT CONSTANT is given: a variable of its type, or a copy of any value that converts to it.
+    fn by_constant_reference(&mut self, v: &Variable<'a>, value: &'a Expr) -> Option<Vec<Local>> {
+        let mut operand = self.expr(value);
+        if operand.is_error() {
+            return None;
+        }
+        let texts = matches!(self.class(v.ty), Class::Text | Class::Wide);
+        let fits = matches!(self.c.types.get(v.ty), Type::OpenArray { .. }) || self.refers_to(v.ty, operand.ty);
+        if fits && matches!(operand.kind, Kind::Place(Place::Memory { .. } | Place::Open { .. })) {
+            operand.fixed = None;
+            if let Type::OpenArray { elem, dims } = *self.c.types.get(v.ty) {
+                return self.open_argument(&v.name, elem, dims, &operand);
+            }
+            let place = self.variable_argument(&v.name, v.ty, &operand)?;
+            return Some(vec![self.address(&place, self.c.types.size(v.ty))]);
+        }
+        let operand = if texts { operand } else { self.convert(operand, v.ty) };
+        if operand.is_error() {
+            return None;
+        }
+        let (size, align) = self.c.types.layout(v.ty);
+        let offset = self.b.slot(size, align);
+        self.assign_place(&Place::Memory { base: Base::Frame, offset }, v.ty, operand, value.span);
+        Some(vec![self.b.address(Base::Frame, offset, size)])
     }
 
     /// The memory place of an argument for a VAR_IN_OUT, if it is a variable of the right type.

@@ -331,8 +331,19 @@ impl<'a> Lowering<'_, 'a> {
             "__QUERYPOINTER" => self.query(args, false, span),
             "__NEW" => self.new_instance(args, span),
             "__DELETE" => self.delete_instance(args, span),
+            "__POUNAME" => self.unit_name(args, span),
             _ => return None,
         })
+    }
+
+    /// `__POUNAME()`: the name of the unit that it stands in.
+    fn unit_name(&mut self, args: &'a [Arg], span: Span) -> Operand {
+        if let Some(arg) = args.first() {
+            self.report(Code::BadArgument, arg.span, "`__POUNAME` takes no arguments");
+        }
+        let name = self.pou.map_or_else(String::new, |pou| self.c.pou_name(pou)).into_bytes();
+        let ty = self.c.types.intern(Type::String((name.len() as u32).max(1)));
+        self.constant(crate::constant::Value::Text(name), ty, span)
     }
 
     fn is_valid_reference(&mut self, args: &'a [Arg], span: Span) -> Operand {

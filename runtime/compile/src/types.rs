@@ -132,6 +132,9 @@ impl<'a> Compiler<'a> {
                 if let Some(e) = elementary(&name.text) {
                     return self.elem(e);
                 }
+                if crate::any::is_generic(&name.text) && self.global_name(&name.text).is_none() {
+                    return self.any_type(span);
+                }
                 self.global_name(&name.text)
             }
             _ => self.path_item(parts.iter().map(|name| name.text.as_str())),
@@ -220,6 +223,9 @@ impl<'a> Compiler<'a> {
                 let ty = self.enum_type(name, body, None);
                 if tree.pragmas.iter().any(|p| p.name == "strict") {
                     self.strict_enums.insert(ty);
+                }
+                if tree.pragmas.iter().any(|p| p.name == "to_string") {
+                    self.spelled_enums.insert(ty);
                 }
                 ty
             }

@@ -62,6 +62,8 @@ pub(crate) struct Compiler<'a> {
     pub(crate) pou_of_type: HashMap<TypeId, usize>,
     /// Enumerations with `{attribute 'strict'}`.
     pub(crate) strict_enums: std::collections::HashSet<TypeId>,
+    /// Enumerations with `{attribute 'to_string'}`.
+    pub(crate) spelled_enums: std::collections::HashSet<TypeId>,
     /// STRUCT EXTENDS.
     pub(crate) struct_bases: HashMap<TypeId, TypeId>,
     pub(crate) program: Program,
@@ -106,6 +108,7 @@ impl<'a> Compiler<'a> {
             type_init: HashMap::new(),
             pou_of_type: HashMap::new(),
             strict_enums: Default::default(),
+            spelled_enums: Default::default(),
             struct_bases: HashMap::new(),
             program: Program::default(),
             natives: HashMap::new(),

@@ -8,7 +8,7 @@ use crate::operator::{Class, is_unsigned_64};
 use crate::scope::Item;
 use crate::types::elementary;
 use takt_abi::Elem;
-use takt_ir::{Op, TypeId};
+use takt_ir::{Op, Type, TypeId};
 use takt_syntax::{Code, Span};
 
 /// A side of a conversion.
@@ -150,6 +150,32 @@ impl Lowering<'_, '_> {
     }
 
     fn text_of(&mut self, a: Operand, span: Span) -> Operand {
+        if self.c.spelled_enums.contains(&a.ty) {
+            return self.enumerator_name(a, span);
+        }
+        self.digits_of(a, span)
+    }
+
+    /// The name of an enumerator; the number where it is none.
+    fn enumerator_name(&mut self, a: Operand, span: Span) -> Operand {
+        let Type::Enum(e) = self.c.types.get(a.ty).clone() else { return self.digits_of(a, span) };
+        let word = self.exact_value(&a);
+        let site = self.site(span);
+        let mut choices = Vec::new();
+        for (name, value) in e.members {
+            let text = name.into_bytes();
+            let ty = self.c.types.intern(Type::String(text.len() as u32));
+            let number = self.b.int(value);
+            let hit = self.b.op(Op::Eq, &[word, number], site);
+            choices.push((hit, self.constant(crate::constant::Value::Text(text), ty, span)));
+        }
+        let number = self.exact(word, a.ty, span);
+        let other = self.digits_of(number, span);
+        let ty = self.c.types.intern(Type::String(80));
+        self.pick(&choices, &other, ty, span)
+    }
+
+    fn digits_of(&mut self, a: Operand, span: Span) -> Operand {
         let Some((name, elem)) = to_text(self.class(a.ty)) else { return self.refuse("conversion to STRING", &a, span) };
         let ty = self.c.elem(elem);
         let a = self.explicit(a, ty);

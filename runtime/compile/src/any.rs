@@ -1,0 +1,165 @@
+//! Inputs of type ANY and its kin: what is passed is a description of the variable (`__SYSTEM.AnyType`): its class of type, address and size.
+
+use crate::expression::{Kind, Lowering, Operand};
+use crate::operator::Class;
+use crate::place::Place;
+use crate::scope::Item;
+use crate::unit::Compiler;
+use takt_abi::Elem;
+use takt_ir::{Base, Inst, Local, Mem, Ty, Type, TypeId};
+use takt_syntax::tree::{Expr, TypeExpr, TypeExprKind};
+use takt_syntax::{Code, Span};
+
+/// The generic types of IEC 61131-3 (6.4.3) that an input may have.
+const GENERIC: [&str; 13] = [
+    "ANY",
+    "ANY_BIT",
+    "ANY_CHAR",
+    "ANY_CHARS",
+    "ANY_DATE",
+    "ANY_DERIVED",
+    "ANY_DURATION",
+    "ANY_ELEMENTARY",
+    "ANY_INT",
+    "ANY_MAGNITUDE",
+    "ANY_NUM",
+    "ANY_REAL",
+    "ANY_STRING",
+];
+
+/// Whether a name is that of a generic type.
+pub(crate) fn is_generic(name: &str) -> bool {
+    GENERIC.iter().any(|known| known.eq_ignore_ascii_case(name))
+}
+
+impl<'a> Compiler<'a> {
+    /// The type that describes a variable, as the library declares it.
+    pub(crate) fn any_type(&mut self, span: Span) -> TypeId {
+        match self.library_names.get("ANYTYPE").copied() {
+            Some(Item::Type(declared)) => self.resolve_declared(declared, span),
+            _ => {
+                self.report(Code::UnknownType, span, "no library of this project has `__SYSTEM.AnyType`, which ANY needs");
+                self.error_type()
+            }
+        }
+    }
+}
+
+/// The generic type that a parameter is declared with.
+pub(crate) fn generic(ty: &TypeExpr) -> Option<&str> {
+    match &ty.kind {
+        TypeExprKind::Named(parts) => parts.last().map(|name| name.text.as_str()).filter(|name| is_generic(name)),
+        _ => None,
+    }
+}
+
+impl<'a> Lowering<'_, 'a> {
+    /// The description of an argument: an address of [`Compiler::any_type`].
+    pub(crate) fn describe(&mut self, wanted: &str, value: &'a Expr) -> Option<Local> {
+        let operand = self.expr(value);
+        if operand.is_error() {
+            return None;
+        }
+        if matches!(operand.kind, Kind::Void) || !self.is_of(wanted, operand.ty) {
+            let found = self.operand_name(&operand);
+            self.report(Code::TypeMismatch, value.span, format!("expected a value of {wanted}, found {found}"));
+            return None;
+        }
+        let pointer = self.described(&operand);
+        let any = self.c.any_type(value.span);
+        let (size, align) = self.c.types.layout(any);
+        let slot = self.b.slot(size, align);
+        let Type::Struct(structure) = self.c.types.get(any).clone() else { return None };
+        let class = self.b.int(self.type_class(operand.ty));
+        let bytes = self.b.int(self.c.types.size(operand.ty).into());
+        for field in structure.fields {
+            let (src, mem) = match field.name.as_str() {
+                "pValue" => (pointer, Mem::I64),
+                "diSize" => (bytes, Mem::I32),
+                _ => (class, Mem::I16),
+            };
+            self.b.push(Inst::Store { src, mem, base: Base::Frame, offset: slot + field.offset });
+        }
+        Some(self.b.address(Base::Frame, slot, size))
+    }
+
+    /// The address of a value; of one that is no variable, of a copy.
+    fn described(&mut self, operand: &Operand) -> Local {
+        if let Kind::Place(place @ Place::Memory { .. }) = &operand.kind {
+            return self.pointer_to(place);
+        }
+        let (size, align) = self.c.types.layout(operand.ty);
+        let offset = self.b.slot(size, align);
+        let place = Place::Memory { base: Base::Frame, offset };
+        self.assign_place(&place, operand.ty, Operand { flex: false, ..operand.clone() }, operand.span);
+        let dst = self.b.local(Ty::I64);
+        self.b.push(Inst::Pointer { dst, base: Base::Frame, offset });
+        dst
+    }
+
+    fn is_of(&self, wanted: &str, ty: TypeId) -> bool {
+        let class = self.class(ty);
+        let (int, real) = (matches!(class, Class::Int(_)), matches!(class, Class::Real(_)));
+        let bits = matches!(self.scalar(ty), Some(Elem::Bool | Elem::Byte | Elem::Word | Elem::Dword | Elem::Lword));
+        let duration = matches!(class, Class::Duration(_));
+        let text = matches!(class, Class::Text | Class::Wide);
+        match wanted.to_uppercase().as_str() {
+            "ANY_INT" => int && !bits,
+            "ANY_REAL" => real,
+            "ANY_NUM" => real || int && !bits,
+            "ANY_MAGNITUDE" => real || duration || int && !bits,
+            "ANY_BIT" => bits,
+            "ANY_STRING" => text,
+            "ANY_CHARS" => text || matches!(class, Class::Char(_)),
+            "ANY_CHAR" => matches!(class, Class::Char(_)),
+            "ANY_DATE" => matches!(class, Class::Moment(_)),
+            "ANY_DURATION" => duration,
+            "ANY_ELEMENTARY" => class != Class::Other,
+            "ANY_DERIVED" => class == Class::Other,
+            _ => true,
+        }
+    }
+
+    /// `__SYSTEM.TYPE_CLASS` of a type.
+    fn type_class(&self, ty: TypeId) -> i64 {
+        match self.c.types.get(ty) {
+            Type::Elem(e) => match e {
+                Elem::Bool => 0,
+                Elem::Byte => 2,
+                Elem::Word => 3,
+                Elem::Dword => 4,
+                Elem::Lword => 5,
+                Elem::Sint => 6,
+                Elem::Int => 7,
+                Elem::Dint => 8,
+                Elem::Lint => 9,
+                Elem::Usint => 10,
+                Elem::Uint => 11,
+                Elem::Udint => 12,
+                Elem::Ulint => 13,
+                Elem::Real => 14,
+                Elem::Lreal => 15,
+                Elem::Time => 18,
+                Elem::Date => 19,
+                Elem::Dt => 20,
+                Elem::Tod => 21,
+                Elem::Ltime => 37,
+                Elem::Ldate => 41,
+                Elem::Ldt => 42,
+                Elem::Ltod => 43,
+                Elem::Char => 44,
+                Elem::Wchar => 45,
+            },
+            Type::String(_) => 16,
+            Type::WString(_) => 17,
+            Type::Pointer(_) => 22,
+            Type::Reference(_) => 23,
+            Type::Subrange { .. } => 24,
+            Type::Enum(_) => 25,
+            Type::Array { .. } | Type::OpenArray { .. } => 26,
+            Type::Struct(_) => 28,
+            Type::Interface(_) => 40,
+            Type::Error => 29,
+        }
+    }
+}
