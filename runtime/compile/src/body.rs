@@ -158,6 +158,7 @@ impl<'a> Lowering<'_, 'a> {
     fn copy_parameter(&mut self, v: &Variable<'a>, i: usize, param: Local) {
         let (size, align) = self.c.types.layout(v.ty);
         let slot = self.b.slot(size, align);
+        self.put_instances(v.ty, slot, 1);
         self.own_storage()[i] = Storage::Frame(slot);
         match self.b.ty(param) {
             Ty::Addr(_) => {

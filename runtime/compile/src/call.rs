@@ -201,6 +201,7 @@ impl<'a> Lowering<'_, 'a> {
             None => {
                 let (size, align) = self.c.types.layout(ty);
                 let slot = self.b.slot(size, align);
+                self.put_instances(ty, slot, 1);
                 let address = self.b.address(Base::Frame, slot, size);
                 emit(self, None, Some(address));
                 let mut value = self.at(Place::Memory { base: Base::Frame, offset: slot }, ty, span);

@@ -61,6 +61,9 @@ impl<'a> Compiler<'a> {
         for i in 0..self.interfaces.len() {
             self.link_interface(i);
         }
+        for i in 0..self.interfaces.len() {
+            self.interfaces[i].all = self.interface_bases(i);
+        }
         for (owner, name) in std::mem::take(&mut self.extends) {
             if let Owner::Pou(pou) = owner {
                 self.home = self.pous[pou].home;
@@ -86,7 +89,7 @@ impl<'a> Compiler<'a> {
         self.home = Some(&tree.home);
         for name in &tree.extends {
             let Some(base) = self.named_interface(name) else { continue };
-            if base == i || self.interface_extends(base, i) {
+            if self.interface_bases(base).contains(&i) {
                 self.report(Code::Circular, name.span, format!("`{}` extends itself", tree.name.text));
                 continue;
             }
@@ -160,9 +163,19 @@ impl<'a> Compiler<'a> {
         std::iter::successors(Some(pou), |pou| self.pous[*pou].base)
     }
 
-    fn interface_extends(&self, interface: usize, base: usize) -> bool {
-        let extends = &self.interfaces[interface].extends;
-        extends.iter().any(|i| *i == base || self.interface_extends(*i, base))
+    /// An interface and what it extends, directly or through others, each once.
+    fn interface_bases(&self, interface: usize) -> Vec<usize> {
+        let mut found = vec![interface];
+        let mut next = 0;
+        while let Some(interface) = found.get(next).copied() {
+            next += 1;
+            for base in &self.interfaces[interface].extends {
+                if !found.contains(base) {
+                    found.push(*base);
+                }
+            }
+        }
+        found
     }
 
     /// Whether a block is of the type `of`.
@@ -170,14 +183,14 @@ impl<'a> Compiler<'a> {
         match of {
             Owner::Pou(base) => self.bases(pou).any(|b| b == base),
             Owner::Interface(i) => {
-                self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| *own == i || self.interface_extends(*own, i)))
+                self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| self.interface_is(*own, i)))
             }
         }
     }
 
     /// Whether an interface is, or extends, another.
     pub(crate) fn interface_is(&self, interface: usize, of: usize) -> bool {
-        interface == of || self.interface_extends(interface, of)
+        self.interfaces[interface].all.contains(&of)
     }
 
     /// A member of a block or of what it extends, and who declares it.
@@ -187,11 +200,7 @@ impl<'a> Compiler<'a> {
 
     /// A member of an interface or of what it extends, and who declares it.
     pub(crate) fn interface_member(&self, interface: usize, name: &str) -> Option<(usize, Member)> {
-        let own = &self.interfaces[interface];
-        match own.members.get(name) {
-            Some(member) => Some((interface, *member)),
-            None => own.extends.iter().find_map(|i| self.interface_member(*i, name)),
-        }
+        self.interfaces[interface].all.iter().find_map(|i| Some((*i, *self.interfaces[*i].members.get(name)?)))
     }
 
     /// The unit that a block runs for a method.
@@ -206,10 +215,14 @@ impl<'a> Compiler<'a> {
     /// Whether something that extends the block has a body of its own for the method.
     pub(crate) fn overridden(&self, pou: usize, method: &str) -> bool {
         let (name, part) = split(method);
-        self.pous[pou].children.iter().any(|child| {
-            let own = name.is_empty() || self.pous[*child].members.get(name).is_some_and(|m| m.part(part).is_some());
-            own || self.overridden(*child, method)
-        })
+        let mut open = self.pous[pou].children.clone();
+        while let Some(child) = open.pop() {
+            if name.is_empty() || self.pous[child].members.get(name).is_some_and(|m| m.part(part).is_some()) {
+                return true;
+            }
+            open.extend(&self.pous[child].children);
+        }
+        false
     }
 
     /// The number under which a method of a type is found at run time.
@@ -422,7 +435,10 @@ impl<'a> Compiler<'a> {
             }
         }
         let own = self.pous[pou].implements.clone();
-        for interface in own {
+        let mut wanted: Vec<usize> = own.into_iter().flat_map(|interface| self.interfaces[interface].all.clone()).collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        for interface in wanted {
             self.check_interface(pou, interface, &mut missing);
         }
         missing.dedup();
@@ -445,9 +461,6 @@ impl<'a> Compiler<'a> {
                     None => missing.push(self.pou_name(wanted)),
                 }
             }
-        }
-        for base in self.interfaces[interface].extends.clone() {
-            self.check_interface(pou, base, missing);
         }
     }
 }

@@ -48,7 +48,7 @@ impl<'a> Compiler<'a> {
             Unit::Interface(tree) => {
                 let ty = self.types.intern(takt_ir::Type::Interface(tree.name.text.as_str().into()));
                 let index = self.interfaces.len();
-                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), members: HashMap::new() });
+                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), all: vec![index], members: HashMap::new() });
                 self.interface_of_type.insert(ty, index);
                 self.interfaces[index].members = self.collect_members(library, Owner::Interface(index), &tree.methods, &tree.properties);
                 self.add(library, &tree.name, Item::Interface(index));

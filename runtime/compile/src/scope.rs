@@ -131,6 +131,8 @@ pub(crate) struct Interface<'a> {
     pub(crate) tree: &'a tree::Interface,
     pub(crate) ty: TypeId,
     pub(crate) extends: Vec<usize>,
+    /// Itself and all that it extends, directly or through others.
+    pub(crate) all: Vec<usize>,
     pub(crate) members: HashMap<String, Member>,
 }
 
