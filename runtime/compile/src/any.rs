@@ -1,5 +1,6 @@
 //! Inputs of type ANY and its kin: what is passed is a description of the variable (`__SYSTEM.AnyType`): its class of type, address and size.
 
+use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand};
 use crate::operator::Class;
 use crate::place::Place;
@@ -7,7 +8,7 @@ use crate::scope::Item;
 use crate::unit::Compiler;
 use takt_abi::Elem;
 use takt_ir::{Base, Inst, Local, Mem, Ty, Type, TypeId};
-use takt_syntax::tree::{Expr, TypeExpr, TypeExprKind};
+use takt_syntax::tree::{Arg, Expr, TypeExpr, TypeExprKind};
 use takt_syntax::{Code, Span};
 
 /// The generic types of IEC 61131-3 (6.4.3) that an input may have.
@@ -81,6 +82,65 @@ impl<'a> Lowering<'_, 'a> {
             self.b.push(Inst::Store { src, mem, base: Base::Frame, offset: slot + field.offset });
         }
         Some(self.b.address(Base::Frame, slot, size))
+    }
+
+    /// `__VARINFO(variable)`: what is known of a variable, as `__SYSTEM.VAR_INFO`.
+    pub(crate) fn variable_info(&mut self, args: &'a [Arg], span: Span) -> Operand {
+        let [Arg { value: Some(value), .. }] = args else {
+            self.check_arguments(args);
+            self.report(Code::BadArgument, span, "`__VARINFO` takes one variable");
+            return self.error(span);
+        };
+        let operand = self.expr(value);
+        let info = match self.c.library_names.get("VAR_INFO").copied() {
+            Some(Item::Type(declared)) => self.c.resolve_declared(declared, span),
+            _ => self.c.error_type(),
+        };
+        let (Kind::Place(place @ Place::Memory { .. }), Type::Struct(structure)) = (&operand.kind, self.c.types.get(info).clone()) else {
+            if !operand.is_error() {
+                self.report(Code::BadArgument, value.span, "`__VARINFO` takes a variable that lies in memory");
+            }
+            return self.error(span);
+        };
+        let address = self.pointer_to(place);
+        let (size, align) = self.c.types.layout(info);
+        let slot = self.b.slot(size, align);
+        let mut bytes = vec![0; size as usize];
+        for field in &structure.fields {
+            if let Some(known) = self.fact(&field.name, value, operand.ty) {
+                self.c.store_value(&known, field.ty, &mut bytes[field.offset as usize..]);
+            }
+        }
+        let data = self.pool(&bytes);
+        self.b.push(Inst::Data { dst: Base::Frame, offset: slot, data, len: size });
+        for field in structure.fields.iter().filter(|f| matches!(f.name.as_str(), "ByteAddress" | "ByteOffset")) {
+            self.b.push(Inst::Store { src: address, mem: Mem::U32, base: Base::Frame, offset: slot + field.offset });
+        }
+        let mut result = self.at(Place::Memory { base: Base::Frame, offset: slot }, info, span);
+        result.fixed = Some("a result");
+        result
+    }
+
+    /// What is known of a variable at compile time, by the name of the member that tells it.
+    fn fact(&self, name: &str, variable: &Expr, ty: TypeId) -> Option<Value> {
+        let size = i128::from(self.c.types.size(ty)) * 8;
+        let (count, elem) = match self.c.types.get(ty) {
+            Type::Array { elem, .. } => (i128::from(self.c.types.size(ty) / self.c.types.size(*elem).max(1)), *elem),
+            _ => (1, ty),
+        };
+        Some(match name {
+            "BitSize" => Value::Int(size),
+            "BitNr" => Value::Int(-1),
+            "TypeClass" => Value::Int(self.type_class(ty).into()),
+            "BaseTypeClass" => Value::Int(self.type_class(elem).into()),
+            "NumElements" => Value::Int(count),
+            "ElemBitSize" => Value::Int(size / count.max(1)),
+            "TypeName" => Value::Text(self.type_name(ty).into_bytes()),
+            "Symbol" => Value::Text(
+                self.c.files[variable.span.file.0 as usize].text.get(variable.span.start as usize..variable.span.end as usize)?.into(),
+            ),
+            _ => return None,
+        })
     }
 
     /// The address of a value; of one that is no variable, of a copy.

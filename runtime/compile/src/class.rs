@@ -182,9 +182,7 @@ impl<'a> Compiler<'a> {
     pub(crate) fn is_a(&self, pou: usize, of: Owner) -> bool {
         match of {
             Owner::Pou(base) => self.bases(pou).any(|b| b == base),
-            Owner::Interface(i) => {
-                self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| self.interface_is(*own, i)))
-            }
+            Owner::Interface(i) => self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| self.interface_is(*own, i))),
         }
     }
 

@@ -332,6 +332,7 @@ impl<'a> Lowering<'_, 'a> {
             "__NEW" => self.new_instance(args, span),
             "__DELETE" => self.delete_instance(args, span),
             "__POUNAME" => self.unit_name(args, span),
+            "__VARINFO" => self.variable_info(args, span),
             _ => return None,
         })
     }
