@@ -221,8 +221,10 @@ pub fn expected() -> Vec<String> {
         ["call gives nothing", "native gives nothing", "return", "check", "deref", "poll", "jump", "branch", "switch"].map(String::from),
     );
     rows.extend(
-        ["none", "index", "division-by-zero", "null-pointer", "wild-pointer", "stack-overflow", "watchdog"].map(|f| format!("fault {f}")),
+        ["none", "index", "division-by-zero", "null-pointer", "wild-pointer", "stack-overflow", "watchdog", "no-instance", "wrong-delete"]
+            .map(|f| format!("fault {f}")),
     );
+    rows.extend(["virtual call gives i64", "virtual call gives f64", "virtual call gives nothing", "is a", "guard", "catch"].map(String::from));
     rows.retain(|row| UNREACHABLE.iter().all(|(name, _)| name != row));
     rows
 }

@@ -108,6 +108,11 @@ impl Generator {
                 let (far, near) = (self.random.below(3000), self.random.pick(&["op + 16", "ADR(oa0) + 32", "ADR(obs)"]));
                 let wild = if self.random.chance(40) { format!("LWORD#{far}") } else { near.to_string() };
                 self.line(&format!("op := {wild};"));
+                match self.random.below(3) {
+                    0 => self.line("on := op; __DELETE(on);"),
+                    1 => self.method_on(&objects, "op^", "TRUE"),
+                    _ => {}
+                }
             }
             4 => self.line("IF on = 0 THEN on := __NEW(ob); END_IF"),
             5 => self.line("op := on := __NEW(oc);"),
@@ -142,9 +147,6 @@ impl Generator {
     }
 
     fn method_call(&mut self, objects: &Objects, instance: &str) {
-        let shape = objects.result.clone();
-        let Some(arguments) = self.arguments(&objects.inputs, &[], 1, true) else { return };
-        let target = self.reach(&|s| *s == shape, true);
         let (path, guard) = match self.random.below(5) {
             0 | 1 => ("it0", "it0 <> 0"),
             2 => ("op^", "op <> 0"),
@@ -152,6 +154,13 @@ impl Generator {
             _ => (instance, "TRUE"),
         };
         let guard = if self.wild && self.random.chance(40) { "TRUE" } else { guard };
+        self.method_on(objects, path, guard);
+    }
+
+    fn method_on(&mut self, objects: &Objects, path: &str, guard: &str) {
+        let shape = objects.result.clone();
+        let Some(arguments) = self.arguments(&objects.inputs, &[], 1, true) else { return };
+        let target = self.reach(&|s| *s == shape, true);
         let call = format!("{path}.act({})", arguments.join(", "));
         let call = target.map_or_else(|| format!("{call};"), |(target, _)| format!("{target} := {call};"));
         self.line(&format!("IF {guard} THEN {call} END_IF"));
