@@ -224,7 +224,9 @@ pub fn expected() -> Vec<String> {
         ["none", "index", "division-by-zero", "null-pointer", "wild-pointer", "stack-overflow", "watchdog", "no-instance", "wrong-delete"]
             .map(|f| format!("fault {f}")),
     );
-    rows.extend(["virtual call gives i64", "virtual call gives f64", "virtual call gives nothing", "is a", "guard", "catch"].map(String::from));
+    rows.extend(
+        ["virtual call gives i64", "virtual call gives f64", "virtual call gives nothing", "is a", "guard", "catch"].map(String::from),
+    );
     rows.retain(|row| UNREACHABLE.iter().all(|(name, _)| name != row));
     rows
 }

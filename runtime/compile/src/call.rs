@@ -6,7 +6,7 @@ use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
 use crate::object::Target;
 use crate::operator::Class;
 use crate::place::Place;
-use crate::scope::{Owner, PouKind, Variable, key};
+use crate::scope::{Item, Owner, PouKind, Variable, key};
 use crate::types::nearest;
 use takt_abi::{FnDesc, Section};
 use takt_ir::{Base, Field, Inst, Local, Mem, StructKind, Structure, Ty, Type, TypeId};
@@ -17,7 +17,7 @@ impl<'a> Lowering<'_, 'a> {
     pub(crate) fn call(&mut self, callee: &'a Expr, args: &'a [Arg], span: Span) -> Operand {
         if let ExprKind::Name(name) = &callee.kind {
             let wanted = key(name);
-            let variable = self.local(&wanted).is_some();
+            let variable = self.local(&wanted).is_some_and(|(level, i)| self.is_callable(level, i));
             let local = variable || self.block().is_some_and(|c| self.c.member_of(c, &wanted).is_some());
             if let (false, true) = (local, wanted.starts_with("__"))
                 && let Some(result) = self.system_function(name, args, span)
@@ -40,7 +40,7 @@ impl<'a> Lowering<'_, 'a> {
                 None => {}
             }
         }
-        match self.thing(callee) {
+        match self.callee(callee) {
             Thing::Function(pou) => self.call_function(pou, args, span),
             Thing::Native(desc) => self.call_native(desc, args, span),
             Thing::Member(bound) => self.call_member(*bound, args, span),
@@ -61,6 +61,32 @@ impl<'a> Lowering<'_, 'a> {
                 self.error(span)
             }
         }
+    }
+
+    /// Whether a variable is an instance that can be called; one that is not does not hide a function of its name.
+    fn is_callable(&self, level: usize, i: usize) -> bool {
+        let mut ty = self.c.pous[self.levels[level].pou].vars[i].ty;
+        while let Type::Reference(to) = self.c.types.get(ty) {
+            ty = *to;
+        }
+        matches!(self.c.types.get(ty), Type::Struct(_) | Type::Error)
+    }
+
+    /// What is called. A variable that cannot be called does not hide a function.
+    fn callee(&mut self, callee: &'a Expr) -> Thing {
+        if let ExprKind::Name(name) = &callee.kind {
+            let wanted = key(name);
+            let hidden = self.local(&wanted).is_some_and(|(level, i)| !self.is_callable(level, i));
+            let function = |item: &Item| match item {
+                Item::Pou(i) => self.c.pous[*i].tree.kind == PouKind::Function,
+                Item::NativeFunction(_) => true,
+                _ => false,
+            };
+            if let Some(item) = self.c.global_name(name).filter(function).filter(|_| hidden) {
+                return self.item(item, name, callee.span);
+            }
+        }
+        self.thing(callee)
     }
 
     /// Checks the arguments of a call that is wrong anyway.

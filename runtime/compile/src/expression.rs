@@ -453,6 +453,10 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 if let Some(e) = elementary(name) {
                     return Thing::Type(self.c.elem(e));
                 }
+                if key(name) == "NULL" {
+                    let ty = self.c.elem(Elem::Lword);
+                    return Thing::Value(Operand { flex: true, ..self.constant(Value::Int(0), ty, span) });
+                }
                 let help = self.suggest(name);
                 self.report(Code::UnknownName, span, format!("`{name}` is not declared")).help = help;
                 Thing::Error
@@ -471,7 +475,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
         }
     }
 
-    fn item(&mut self, item: Item, name: &str, span: Span) -> Thing {
+    pub(crate) fn item(&mut self, item: Item, name: &str, span: Span) -> Thing {
         match item {
             Item::Global(i) => Thing::Value(self.global(i, span)),
             Item::Pou(i) => self.pou_thing(i, span),
