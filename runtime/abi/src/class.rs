@@ -27,10 +27,10 @@ impl Classes {
     }
     /// `count` instances of `class` from `offset` on, one each `stride` bytes. What lies outside the table or between granules is left out.
     pub fn put(&self, offset: u64, class: u32, stride: u64, count: u64) {
-        for at in (0..count).map_while(|i| offset.checked_add(i.checked_mul(stride)?)) {
-            if let (true, Some(entry)) = (at.is_multiple_of(GRANULE), self.0.get((at / GRANULE) as usize)) {
-                entry.store(class, Relaxed);
-            }
+        let end = self.0.len() as u64 * GRANULE;
+        let places = (0..count).map_while(|i| offset.checked_add(i.checked_mul(stride)?)).take_while(|at| *at < end);
+        for at in places.filter(|at| at.is_multiple_of(GRANULE)) {
+            self.0[(at / GRANULE) as usize].store(class, Relaxed);
         }
     }
     /// No instance begins in these bytes any more.
