@@ -5,5 +5,6 @@ pub mod bench;
 pub mod case;
 pub mod coverage;
 pub mod generate;
+pub mod large;
 pub mod shrink;
 pub mod trial;

@@ -5,6 +5,7 @@
 //! anything but its own image.
 
 mod calendar;
+mod calls;
 pub mod heap;
 mod inst;
 mod interp;
@@ -22,6 +23,7 @@ mod types;
 mod value;
 mod verify;
 
+pub use calls::{CallGraph, Components};
 pub use inst::{Base, Block, BlockId, Body, BodyId, Const, Inst, Local, Mem, NativeId, SiteId, Term, Ty};
 pub use interp::{Interpreter, run_body};
 pub use literal::{ValueError, parse_value};

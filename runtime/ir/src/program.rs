@@ -1,6 +1,6 @@
 //! A complete program.
 
-use crate::inst::{Body, BodyId, Inst, Ty};
+use crate::inst::{Body, BodyId, Ty};
 use crate::types::{TypeId, Types};
 use takt_abi::{Classes, GRANULE, Heap, NativeFn};
 
@@ -184,21 +184,6 @@ impl Program {
     /// A class by its number.
     pub fn class(&self, number: u32) -> Option<&Class> {
         self.classes.get(number.checked_sub(1)? as usize)
-    }
-    /// The numbers of the bodies that a body may call, with repetitions.
-    pub fn callees(&self, body: &Body) -> Vec<usize> {
-        let mut found = Vec::new();
-        for inst in body.blocks.iter().flat_map(|block| &block.insts) {
-            match inst {
-                Inst::Call { body, .. } => found.push(body.0 as usize),
-                Inst::Virtual { method, .. } => {
-                    let targets = self.dispatch.get(*method as usize).map_or(&[][..], |method| &method.targets);
-                    found.extend(targets.iter().flatten().map(|body| body.0 as usize));
-                }
-                _ => {}
-            }
-        }
-        found
     }
     /// The table of instances as it is at the start; empty without classes.
     pub fn instances(&self) -> Classes {

@@ -3,7 +3,7 @@
 //! A chain of calls holds each body outside cycles at most once, and bodies of cycles at most as often as the depth limit allows: each of their
 //! entries is counted.
 
-use takt_ir::Program;
+use takt_ir::{CallGraph, Program};
 
 /// What is added for native functions, polls and the way in, bytes.
 pub const NATIVE_STACK: usize = 256 * 1024;
@@ -29,22 +29,16 @@ impl StackUse {
     }
 }
 
-/// The longest path through the graph of calls, where bodies of cycles weigh nothing: relaxed until nothing changes. The number of rounds is bounded
-/// for a graph whose cycles were not all marked.
+/// The longest path through the graph of calls, where bodies of cycles weigh nothing.
 fn longest_chain(program: &Program, frames: &[usize]) -> usize {
-    let calls: Vec<Vec<usize>> = program.bodies.iter().map(|body| program.callees(body)).collect();
-    let mut below = vec![0; frames.len()];
-    for _ in 0..=frames.len() {
-        let mut changed = false;
-        for body in (0..frames.len()).chain((0..frames.len()).rev()) {
-            let weight = if program.bodies[body].recursive { 0 } else { frames[body] };
-            let deepest = calls[body].iter().map(|callee| below[*callee]).max().unwrap_or(0) + weight;
-            changed |= deepest > below[body];
-            below[body] = below[body].max(deepest);
-        }
-        if !changed {
-            break;
-        }
+    let graph = CallGraph::new(program);
+    let mut below = vec![0; graph.nodes()];
+    for component in graph.components().iter() {
+        let weight = |node: &usize| program.bodies.get(*node).filter(|body| !body.recursive).map_or(0, |_| frames[*node]);
+        // Callees come first: what is called and not in the component is known.
+        let deepest = component.iter().flat_map(|node| graph.calls(*node)).map(|callee| below[*callee]).max().unwrap_or(0);
+        let own: usize = component.iter().map(weight).sum();
+        component.iter().for_each(|node| below[*node] = deepest + own);
     }
     below.into_iter().max().unwrap_or(0)
 }
