@@ -42,17 +42,18 @@ pub fn found(output: &Output) -> Vec<Expected> {
 /// Whether a case holds; else what is wrong.
 pub fn run_case(case: &Case) -> Result<(), String> {
     match case.kind.as_str() {
-        "check" => check(case),
+        "check" => check(case, &Choices::default()),
+        "lint" => check(case, &Choices { lint: true, ..Choices::default() }),
         "run" => run(case),
         "ir" => run_ir(case),
         other => Err(format!("`{other}` is not a kind of case")),
     }
 }
 
-fn check(case: &Case) -> Result<(), String> {
+fn check(case: &Case, choices: &Choices) -> Result<(), String> {
     let mut expected = expectations(&case.source);
     expected.sort_by_key(|e| (e.line, e.column));
-    let found = found(&compile(&case.source));
+    let found = found(&compile_with(&case.source, choices));
     let fits = |(e, f): (&Expected, &Expected)| (e.line, e.column, &e.code) == (f.line, f.column, &f.code) && f.text.contains(&e.text);
     if expected.len() == found.len() && expected.iter().zip(&found).all(fits) {
         return Ok(());

@@ -58,7 +58,10 @@ impl Lowering<'_, '_> {
                 self.explicit(a, to)
             }
             (Class::Text, Class::Text) | (Class::Wide, Class::Wide) => self.text_to_text(a, to),
-            (Class::Pointer, Class::Pointer) => Operand { ty: to, ..a },
+            (Class::Pointer, Class::Pointer) => {
+                self.lint_pointer(&a, to);
+                Operand { ty: to, ..a }
+            }
             (Class::Int(e), Class::Pointer) | (Class::Pointer, Class::Int(e))
                 if takt_ir::elem_size(e) == 8 || matches!(a.kind, Kind::Const(Value::Int(0))) =>
             {

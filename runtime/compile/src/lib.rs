@@ -24,6 +24,7 @@ mod image;
 mod initial;
 mod intrinsic;
 mod library;
+mod lint;
 mod namespace;
 mod object;
 mod operator;
@@ -59,6 +60,8 @@ pub struct Options {
     pub iec_arithmetic: bool,
     /// Implicit conversions that may lose information are errors.
     pub strict: bool,
+    /// Likely mistakes in programs that run all the same are warned of.
+    pub lint: bool,
     /// Bytes of the heap of `__NEW` (rounded up to a power of two); 0 means 1 MiB. A program that does not use it has none.
     pub heap: u32,
     /// BOOL expressions in global scope (`--until`, conditions of the manifest). Their [`FileId`]s follow those of the sources.

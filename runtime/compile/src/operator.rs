@@ -256,6 +256,10 @@ impl<'a> Lowering<'_, 'a> {
             _ => (a, b),
         };
         let (ca, cb) = (self.class(a.ty), self.class(b.ty));
+        if is_comparison(op) {
+            self.lint_equality(op, &a, &b, span);
+            self.lint_range(op, &a, &b, span);
+        }
         match (op, ca, cb) {
             (And | Or | Xor | Eq | Ne | Lt | Le | Gt | Ge, Class::Bool, Class::Bool) => {
                 let ty = self.bool_type();

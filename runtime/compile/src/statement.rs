@@ -53,6 +53,7 @@ impl<'a> Lowering<'_, 'a> {
     fn expression_statement(&mut self, e: &'a Expr) {
         let operand = self.expr(e);
         if operand.is_error() || matches!(e.kind, ExprKind::Call(..) | ExprKind::Assign(..)) {
+            self.lint_call(e, &operand);
             return;
         }
         let block = matches!(self.c.types.get(operand.ty), Type::Struct(s) if s.kind == takt_ir::StructKind::Block);
@@ -371,6 +372,9 @@ impl<'a> Lowering<'_, 'a> {
                     ranges.push((low, high, *block));
                 }
             }
+        }
+        if otherwise.is_none() {
+            self.lint_case(ty, &seen, value.span);
         }
         self.case_ranges(word, &ranges, ty, value.span);
         self.b.end(Term::Switch { value: word, cases, default });

@@ -137,6 +137,7 @@ impl<'a> Compiler<'a> {
         self.finish_classes();
         self.mark_recursion();
         self.finish_image(tasks);
+        self.lint();
         let mut program = std::mem::take(&mut self.program);
         program.sites = std::mem::take(&mut self.sites.all);
         program.types = std::mem::take(&mut self.types);

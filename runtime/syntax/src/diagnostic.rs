@@ -116,11 +116,21 @@ codes! {
     W0102 WarningPragma "the program says `{warning}` itself",
     E0501 BadFile "a source file is not what its name says, or is damaged",
     E0502 OtherLanguage "a body is written in another language than Structured Text",
+    W0201 Unused "a variable is never used",
+    W0202 NeverRead "a value is stored and never used",
+    W0203 Shadowed "a local name hides a variable of the block or a global one",
     W0301 LossyConversion "an implicit conversion may lose information",
     W0302 ResultUnused "a value is computed and not used",
     W0303 SharedData "two tasks use a variable and one may see it half changed",
     W0304 NeverAssigned "a result is never assigned",
     W0305 ConstantOverflow "a constant does not fit and is cut",
+    W0306 SelfAssigned "an assignment changes nothing",
+    W0307 Unreachable "a statement is never reached",
+    W0308 AlwaysSame "a condition is always TRUE or always FALSE",
+    W0309 FloatEquality "REAL values are compared for equality",
+    W0310 MissingMember "a CASE leaves out members of its enumeration",
+    W0311 TwoWriters "two tasks write the same variable",
+    W0312 PointerType "a pointer gets the address of something of another type",
 }
 
 /// The page of a code such as `E0301`, in any case of its letter; `None` if there is no such code.

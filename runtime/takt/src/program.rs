@@ -56,6 +56,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
     let options = takt_compile::Options {
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
+        lint: true,
         heap: project.manifest.heap,
         defines: project.manifest.defines.clone(),
         conditions: conditions.iter().map(|condition| Source { name: name(condition), text: condition.text.clone() }).collect(),

@@ -1,0 +1,299 @@
+//! Variables that tasks share: written by two, or seen half changed.
+//!
+//! Read off the IR, where each access of a global has an offset. What a body does behind the addresses it is given is found once per body
+//! ([`Effects::params`]) and holds for all its calls. Accesses through pointers are unknown and silent.
+
+use crate::scope::{PouKind, Storage};
+use crate::unit::Compiler;
+use std::collections::{BTreeSet, HashMap};
+use takt_ir::{Base, Body, Inst, Local, Program, StructKind, Ty, Type, TypeId};
+use takt_syntax::{Code, Note, Span};
+
+/// Bytes that are never torn.
+const WORD: u32 = 8;
+
+/// Bytes of the image: first, and behind the last.
+type Range = (u32, u32);
+
+/// What a body does with memory.
+#[derive(Debug, Default, Clone, PartialEq)]
+struct Effects {
+    reads: BTreeSet<Range>,
+    writes: BTreeSet<Range>,
+    /// Parameters behind which it reads and writes.
+    params: HashMap<u32, (bool, bool)>,
+}
+
+/// Where a local of a body points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Target {
+    Image(Range),
+    Param(u32),
+}
+
+/// A variable that several tasks can name.
+struct Shared {
+    name: String,
+    range: Range,
+    span: Span,
+    /// Elementary, or a block: nothing that two tasks fill together, as they do when they hand values over.
+    single: bool,
+}
+
+/// What a task does, and with which unit.
+struct Share {
+    task: usize,
+    unit: usize,
+    reads: BTreeSet<Range>,
+    writes: BTreeSet<Range>,
+}
+
+impl Compiler<'_> {
+    /// Reports what tasks share badly.
+    pub(super) fn lint_tasks(&mut self) {
+        if self.program.tasks.len() < 2 {
+            return;
+        }
+        let effects = all_effects(&self.program);
+        let unit_of: HashMap<usize, usize> = self.pous.iter().enumerate().filter_map(|(i, p)| Some((p.body?.0 as usize, i))).collect();
+        let reached: Vec<Vec<usize>> = self.program.tasks.iter().map(|task| reached(&self.program, task.entry.0 as usize)).collect();
+        for variable in self.shared() {
+            let mut shares: Vec<Share> = Vec::new();
+            for (task, bodies) in reached.iter().enumerate() {
+                for body in bodies {
+                    let Some(unit) = unit_of.get(body).copied() else { continue };
+                    let (reads, writes) = (inside(&effects[*body].reads, variable.range), inside(&effects[*body].writes, variable.range));
+                    if !reads.is_empty() || !writes.is_empty() {
+                        shares.push(Share { task, unit, reads, writes });
+                    }
+                }
+            }
+            if !variable.single || !self.two_writers(&variable, &shares) {
+                self.half_changed(&variable, &shares);
+            }
+        }
+    }
+
+    /// Globals, and variables of programs.
+    fn shared(&self) -> Vec<Shared> {
+        let mut found = Vec::new();
+        for (global, var) in self.globals.iter().filter_map(|g| Some((g, g.var.as_ref()?))) {
+            if let (Storage::Image(start), true) = (&var.storage, (var.span.file.0 as usize) < self.user_files && !global.constant) {
+                let range = (*start, start.saturating_add(self.types.size(var.ty)));
+                found.push(Shared { name: var.name.clone(), range, span: var.span, single: self.is_single(var.ty) });
+            }
+        }
+        for pou in self.pous.iter().filter(|pou| pou.tree.kind == PouKind::Program && !pou.library) {
+            for var in &pou.vars {
+                let Storage::This(offset) = var.storage else { continue };
+                let start = pou.instance.saturating_add(offset);
+                let range = (start, start.saturating_add(self.types.size(var.ty)));
+                let name = format!("{}.{}", pou.tree.name.text, var.name);
+                found.push(Shared { name, range, span: var.span, single: self.is_single(var.ty) });
+            }
+        }
+        found
+    }
+
+    fn is_single(&self, ty: TypeId) -> bool {
+        match self.types.get(ty) {
+            Type::Struct(s) => s.kind == StructKind::Block,
+            Type::Array { .. } | Type::OpenArray { .. } => false,
+            _ => true,
+        }
+    }
+
+    fn two_writers(&mut self, variable: &Shared, shares: &[Share]) -> bool {
+        let clash = shares.iter().enumerate().find_map(|(i, a)| {
+            let b = shares[i + 1..].iter().find(|b| b.task != a.task && overlap(&a.writes, &b.writes).next().is_some())?;
+            Some((a, b))
+        });
+        let Some((a, b)) = clash else { return false };
+        let message = format!("`{}` is written in the tasks {} and {}", variable.name, self.task_name(a.task), self.task_name(b.task));
+        let notes = vec![self.share_note(a, "written"), self.share_note(b, "written")];
+        let diagnostic = self.report(Code::TwoWriters, variable.span, message);
+        diagnostic.notes = notes;
+        diagnostic.help = Some("let one task write it; give the other a variable of its own for what it asks for".into());
+        true
+    }
+
+    fn half_changed(&mut self, variable: &Shared, shares: &[Share]) {
+        let priority = |share: &Share| self.program.tasks[share.task].priority;
+        let torn = shares.iter().find_map(|writer| {
+            let reader = shares.iter().find(|reader| {
+                let common: BTreeSet<Range> = overlap(&writer.writes, &reader.reads).collect();
+                priority(reader) != priority(writer) && (common.len() > 1 || common.iter().any(|(start, end)| end - start > WORD))
+            })?;
+            Some((writer, reader))
+        });
+        let Some((writer, reader)) = torn else { return };
+        let (writing, reading) = (self.task_name(writer.task), self.task_name(reader.task));
+        let message = format!("`{}` is written in the task {writing} and read in {reading}, which may see it half changed", variable.name);
+        let notes = vec![self.share_note(writer, "written"), self.share_note(reader, "read")];
+        let diagnostic = self.report(Code::SharedData, variable.span, message);
+        diagnostic.notes = notes;
+        diagnostic.help = Some("give both tasks the same priority, or hand the values over with a flag that is written last".into());
+    }
+
+    fn task_name(&self, task: usize) -> String {
+        format!("`{}`", self.program.tasks[task].name)
+    }
+
+    fn share_note(&self, share: &Share, verb: &str) -> Note {
+        let message = format!("{verb} in `{}`, in the task {}", self.pou_name(share.unit), self.task_name(share.task));
+        Note { span: self.pous[share.unit].tree.name.span, message }
+    }
+}
+
+/// The bodies that run in a task.
+fn reached(program: &Program, entry: usize) -> Vec<usize> {
+    let (mut seen, mut open, mut found) = (vec![false; program.bodies.len()], vec![entry], Vec::new());
+    while let Some(body) = open.pop() {
+        if !std::mem::replace(&mut seen[body], true) {
+            found.push(body);
+            open.extend(program.callees(&program.bodies[body]));
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+/// The effects of all bodies; repeated until those behind parameters are known through every row of calls.
+fn all_effects(program: &Program) -> Vec<Effects> {
+    let mut effects = vec![Effects::default(); program.bodies.len()];
+    loop {
+        let mut changed = false;
+        for (i, body) in program.bodies.iter().enumerate() {
+            let found = Walk { body, all: &effects, targets: HashMap::new(), found: effects[i].clone() }.run();
+            if found != effects[i] {
+                (effects[i], changed) = (found, true);
+            }
+        }
+        if !changed {
+            return effects;
+        }
+    }
+}
+
+struct Walk<'p> {
+    body: &'p Body,
+    all: &'p [Effects],
+    targets: HashMap<Local, Target>,
+    found: Effects,
+}
+
+impl Walk<'_> {
+    fn run(mut self) -> Effects {
+        for param in 0..self.body.params {
+            if let Some(Ty::Addr(_)) = self.body.locals.get(param as usize) {
+                self.targets.insert(Local(param), Target::Param(param));
+            }
+        }
+        let body = self.body;
+        body.blocks.iter().flat_map(|block| &block.insts).for_each(|inst| self.step(inst));
+        self.found
+    }
+
+    fn step(&mut self, inst: &Inst) {
+        match inst {
+            Inst::Load { dst, mem, base, offset } => {
+                self.access(*base, *offset, mem.size(), true, false);
+                self.targets.remove(dst);
+            }
+            Inst::Store { mem, base, offset, .. } => self.access(*base, *offset, mem.size(), false, true),
+            Inst::Data { dst, offset, len, .. } => self.access(*dst, *offset, *len, false, true),
+            Inst::Move { dst, dst_offset, src, src_offset, len } => {
+                self.access(*src, *src_offset, *len, true, false);
+                self.access(*dst, *dst_offset, *len, false, true);
+            }
+            Inst::Address { dst, base, offset } | Inst::Pointer { dst, base, offset } => {
+                let len = self.extent(*dst);
+                self.point(*dst, *base, *offset, len);
+            }
+            Inst::Index { dst, base, offset, low, high, stride, .. } => {
+                let count = high.saturating_sub(*low).saturating_add(1).clamp(0, u32::MAX.into()) as u32;
+                self.point(*dst, *base, *offset, stride.saturating_mul(count));
+            }
+            Inst::Call { body, args, .. } => self.call(body.0 as usize, args),
+            Inst::Native { args, .. } => args.iter().for_each(|arg| self.touch(*arg, (true, true))),
+            Inst::Virtual { this, args, .. } => std::iter::once(this).chain(args).for_each(|arg| self.touch(*arg, (true, true))),
+            Inst::Copy { dst, src } => match self.targets.get(src).copied() {
+                Some(target) => drop(self.targets.insert(*dst, target)),
+                None => drop(self.targets.remove(dst)),
+            },
+            Inst::Const { dst, .. } | Inst::Op { dst, .. } | Inst::Deref { dst, .. } => drop(self.targets.remove(dst)),
+            _ => {}
+        }
+    }
+
+    fn extent(&self, local: Local) -> u32 {
+        match self.body.locals.get(local.0 as usize) {
+            Some(Ty::Addr(extent)) => *extent,
+            _ => 1,
+        }
+    }
+
+    fn target(&self, base: Base, offset: u32, len: u32) -> Option<Target> {
+        match base {
+            Base::Image => Some(Target::Image((offset, offset.saturating_add(len)))),
+            Base::Frame => None,
+            Base::Local(local) => match *self.targets.get(&local)? {
+                // An element may be any: all of the array is meant.
+                Target::Image((start, end)) if end - start > self.extent(local) => Some(Target::Image((start, end))),
+                Target::Image((start, _)) => {
+                    let start = start.saturating_add(offset);
+                    Some(Target::Image((start, start.saturating_add(len))))
+                }
+                param => Some(param),
+            },
+        }
+    }
+
+    fn point(&mut self, dst: Local, base: Base, offset: u32, len: u32) {
+        match self.target(base, offset, len) {
+            Some(target) => drop(self.targets.insert(dst, target)),
+            None => drop(self.targets.remove(&dst)),
+        }
+    }
+
+    fn access(&mut self, base: Base, offset: u32, len: u32, reads: bool, writes: bool) {
+        if let Some(target) = self.target(base, offset, len) {
+            self.note(target, (reads, writes));
+        }
+    }
+
+    fn touch(&mut self, arg: Local, how: (bool, bool)) {
+        if let Some(target) = self.targets.get(&arg).copied() {
+            self.note(target, how);
+        }
+    }
+
+    fn call(&mut self, body: usize, args: &[Local]) {
+        for (param, arg) in args.iter().enumerate() {
+            let how = self.all.get(body).and_then(|effects| effects.params.get(&(param as u32))).copied();
+            how.into_iter().for_each(|how| self.touch(*arg, how));
+        }
+    }
+
+    fn note(&mut self, target: Target, (reads, writes): (bool, bool)) {
+        match target {
+            Target::Image(range) => {
+                reads.then(|| self.found.reads.insert(range));
+                writes.then(|| self.found.writes.insert(range));
+            }
+            Target::Param(param) => {
+                let known = self.found.params.entry(param).or_default();
+                *known = (known.0 || reads, known.1 || writes);
+            }
+        }
+    }
+}
+
+/// The parts of ranges that lie inside of a variable.
+fn inside(ranges: &BTreeSet<Range>, (start, end): Range) -> BTreeSet<Range> {
+    ranges.iter().filter_map(|(s, e)| Some(((*s).max(start), (*e).min(end))).filter(|(s, e)| s < e)).collect()
+}
+
+fn overlap<'r>(a: &'r BTreeSet<Range>, b: &'r BTreeSet<Range>) -> impl Iterator<Item = Range> + 'r {
+    a.iter().flat_map(|a| b.iter().map(|b| (a.0.max(b.0), a.1.min(b.1)))).filter(|(start, end)| start < end)
+}
