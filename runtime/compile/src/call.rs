@@ -24,7 +24,9 @@ impl<'a> Lowering<'_, 'a> {
             {
                 return result;
             }
+            let hidden = self.local(&wanted).is_some() && !crate::intrinsic::is_known(&wanted);
             if !local
+                && !hidden
                 && self.c.global_name(name).is_none_or(|i| matches!(i, crate::scope::Item::Member(..) | crate::scope::Item::Enumerator(..)))
             {
                 return self.intrinsic(name, callee.span, args, span);

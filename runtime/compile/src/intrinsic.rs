@@ -225,6 +225,11 @@ impl<'a> Lowering<'_, 'a> {
     }
 }
 
+/// Whether the compiler knows a function of that name (upper case) itself.
+pub(crate) fn is_known(name: &str) -> bool {
+    matches!(name, "ADR" | "REF" | "SIZEOF" | "XSIZEOF" | "LOWER_BOUND" | "UPPER_BOUND") || is_intrinsic(name)
+}
+
 fn is_intrinsic(name: &str) -> bool {
     OTHERS.contains(&name)
         || REAL_FUNCTIONS.iter().any(|(n, ..)| *n == name)

@@ -6,7 +6,7 @@
 use crate::scope::{PouKind, Storage};
 use crate::unit::Compiler;
 use std::collections::{BTreeSet, HashMap};
-use takt_ir::{Base, Body, Inst, Local, Program, StructKind, Ty, Type, TypeId};
+use takt_ir::{Base, Body, CallGraph, Inst, Local, Program, StructKind, Ty, Type, TypeId};
 use takt_syntax::{Code, Note, Span};
 
 /// Bytes that are never torn.
@@ -56,7 +56,8 @@ impl Compiler<'_> {
         }
         let effects = all_effects(&self.program);
         let unit_of: HashMap<usize, usize> = self.pous.iter().enumerate().filter_map(|(i, p)| Some((p.body?.0 as usize, i))).collect();
-        let reached: Vec<Vec<usize>> = self.program.tasks.iter().map(|task| reached(&self.program, task.entry.0 as usize)).collect();
+        let graph = CallGraph::new(&self.program);
+        let reached: Vec<Vec<usize>> = self.program.tasks.iter().map(|task| reached(&self.program, &graph, task.entry.0 as usize)).collect();
         for variable in self.shared() {
             let mut shares: Vec<Share> = Vec::new();
             for (task, bodies) in reached.iter().enumerate() {
@@ -146,12 +147,13 @@ impl Compiler<'_> {
 }
 
 /// The bodies that run in a task.
-fn reached(program: &Program, entry: usize) -> Vec<usize> {
-    let (mut seen, mut open, mut found) = (vec![false; program.bodies.len()], vec![entry], Vec::new());
-    while let Some(body) = open.pop() {
-        if !std::mem::replace(&mut seen[body], true) {
-            found.push(body);
-            open.extend(program.callees(&program.bodies[body]));
+fn reached(program: &Program, graph: &CallGraph, entry: usize) -> Vec<usize> {
+    let (mut seen, mut open, mut found) = (vec![false; graph.nodes()], vec![entry], Vec::new());
+    while let Some(node) = open.pop() {
+        if !std::mem::replace(&mut seen[node], true) {
+            // Behind the bodies stand the methods that are found by class.
+            found.extend(Some(node).filter(|node| *node < program.bodies.len()));
+            open.extend(graph.calls(node));
         }
     }
     found.sort_unstable();
