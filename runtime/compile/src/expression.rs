@@ -471,7 +471,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 let spelled = seen().find(|v| key(&v.name) == found).map_or(found, |v| v.name.clone());
                 Some(format!("did you mean `{spelled}`?"))
             }
-            None => self.c.suggest(name, false),
+            None => {
+                let wanted = key(name);
+                let list = self.c.lists.iter().find(|list| list.vars.contains_key(&wanted));
+                list.map(|list| format!("write `{}.{name}`", list.name)).or_else(|| self.c.suggest(name, false))
+            }
         }
     }
 

@@ -185,10 +185,19 @@ impl<'a> Compiler<'a> {
     }
 
     fn overlay_array(&mut self, items: &'a [InitItem], ty: TypeId, at: u32, target: &mut Target<'a, '_>, span: Span) {
-        let Type::Array { elem, .. } = *self.types.get(ty) else {
+        let Type::Array { elem, dims } = self.types.get(ty).clone() else {
             let name = self.types.name(ty);
             self.report(Code::BadInitializer, span, format!("expected a value of type `{name}`, found a list"));
             return;
+        };
+        // A list of lists gives the rows of an array of several dimensions.
+        let nested = |item: &InitItem| match item {
+            InitItem::One(init) => matches!(init, Init::Array(..)),
+            InitItem::Repeat(_, inits) => inits.iter().all(|init| matches!(init, Init::Array(..))),
+        };
+        let elem = match &dims[..] {
+            [_, rest @ ..] if !rest.is_empty() && items.iter().all(nested) => self.types.intern(Type::Array { elem, dims: rest.to_vec() }),
+            _ => elem,
         };
         let mut room = Room { next: at, end: at + self.types.size(ty), size: self.types.size(elem).max(1) };
         for item in items {
