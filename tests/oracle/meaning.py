@@ -316,7 +316,7 @@ class Language:
         return a if self.compare("<=" if name == "MIN" else ">=", a, b).data else b
 
     def limit(self, low, value, high):
-        return self.extreme("MAX", low, self.extreme("MIN", value, high))
+        return self.extreme("MIN", self.extreme("MAX", low, value), high)
 
     def select(self, g, a, b):
         to = self.common_of(a, b)

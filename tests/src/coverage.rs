@@ -153,6 +153,7 @@ fn rows_of(body: &Body, insts: &[Inst], term: &Term) -> Vec<String> {
         Term::Return(None) => "return".into(),
         Term::Return(Some(l)) => format!("return {}", class(body.locals[l.0 as usize])),
         Term::Fault(..) => "fault term".into(),
+        Term::Rethrow(_) => "rethrow".into(),
     });
     rows
 }

@@ -83,6 +83,13 @@ impl Context {
         self.trace_len = 0;
         self.fault_code
     }
+    /// Takes up the fault with that number again, whose facts and site are still here, and returns its code.
+    pub fn again(&mut self, code: u64) -> u32 {
+        let known = u32::try_from(code).ok().and_then(|code| Fault::from_raw(code, self.fault_facts)).unwrap_or(Fault::Panic);
+        self.fault_code = known.code();
+        self.trace_len = 0;
+        self.fault_code
+    }
     /// Appends a caller's site to the trace.
     pub fn push_trace(&mut self, site: u32) {
         if let Some(entry) = self.trace.get_mut(self.trace_len as usize) {

@@ -160,7 +160,7 @@ fn targets(term: &Term) -> Vec<BlockId> {
         Term::Jump(to) => vec![*to],
         Term::Branch { then, other, .. } => vec![*then, *other],
         Term::Switch { cases, default, .. } => cases.iter().map(|(_, to)| *to).chain([*default]).collect(),
-        Term::Return(_) | Term::Fault(..) => Vec::new(),
+        Term::Return(_) | Term::Fault(..) | Term::Rethrow(_) => Vec::new(),
     }
 }
 

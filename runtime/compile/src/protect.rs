@@ -1,7 +1,7 @@
 //! `__TRY … __CATCH(code) … __FINALLY … __ENDTRY`.
 
 use crate::expression::{Kind, Lowering, Thing};
-use takt_ir::{Inst, Local, Op, Term, Ty};
+use takt_ir::{BlockId, Inst, Local, Op, Term, Ty};
 use takt_syntax::tree::{Name, Stmt};
 use takt_syntax::{Code, Span};
 
@@ -16,30 +16,52 @@ impl<'a> Lowering<'_, 'a> {
         finally: Option<&'a [Stmt]>,
         span: Span,
     ) {
-        let Some((variable, handling)) = catch else {
-            self.report(Code::BadStatement, span, "a __TRY needs a __CATCH").help = Some("write `__CATCH(code)` before `__ENDTRY`".into());
-            return self.statements(body);
-        };
+        if catch.is_none() && finally.is_none() {
+            self.report(Code::BadStatement, span, "a __TRY needs a __CATCH or a __FINALLY").help =
+                Some("write `__CATCH(code)` before `__ENDTRY`".into());
+        }
         let depth = self.b.local(Ty::I64);
         self.b.push(Inst::Guard { dst: depth });
-        let (handler, after) = (self.b.block(), self.b.block());
+        let (handler, last, after) = (self.b.block(), self.b.block(), self.b.block());
+        let outer = self.b.guard(None);
+        self.protected.push((self.loops.len(), finally.unwrap_or_default()));
+        let caught = if catch.is_some() { handler } else { last };
+        self.guarded(body, caught, after);
+        if let Some((variable, handling)) = catch {
+            self.b.go_to(handler);
+            let fault = self.b.local(Ty::I64);
+            self.b.push(Inst::Catch { dst: fault, depth });
+            if let Some(variable) = variable {
+                self.tell_exception(variable, fault);
+            }
+            let passed = if finally.is_some() { Some(last) } else { outer };
+            match passed {
+                Some(passed) => self.guarded(handling, passed, after),
+                None => self.statements(handling),
+            }
+            self.b.end(Term::Jump(after));
+        }
+        self.protected.pop();
+        self.b.guard(outer);
+        if let Some(finally) = finally {
+            self.b.go_to(last);
+            let fault = self.b.local(Ty::I64);
+            self.b.push(Inst::Catch { dst: fault, depth });
+            self.statements(finally);
+            self.b.end(Term::Rethrow(fault));
+        }
+        self.b.go_to(after);
+        self.statements(finally.unwrap_or_default());
+    }
+
+    /// Statements whose faults lead to `handler`; behind them it goes on at `after`.
+    fn guarded(&mut self, statements: &'a [Stmt], handler: BlockId, after: BlockId) {
         let outer = self.b.guard(Some(handler));
         let inside = self.b.block();
         self.b.continue_in(inside);
-        self.protected.push((self.loops.len(), finally.unwrap_or_default()));
-        self.statements(body);
+        self.statements(statements);
         self.b.guard(outer);
         self.b.end(Term::Jump(after));
-        self.b.go_to(handler);
-        let fault = self.b.local(Ty::I64);
-        self.b.push(Inst::Catch { dst: fault, depth });
-        if let Some(variable) = variable {
-            self.tell_exception(variable, fault);
-        }
-        self.statements(handling);
-        self.protected.pop();
-        self.b.continue_in(after);
-        self.statements(finally.unwrap_or_default());
     }
 
     /// Puts the code of the exception into the variable of __CATCH.

@@ -332,6 +332,8 @@ pub enum Term {
     Return(Option<Local>),
     /// Stop with a fault.
     Fault(Fault, SiteId),
+    /// Stop with the fault that [`Inst::Catch`] took, of which this is the number, as if it had not been caught.
+    Rethrow(Local),
 }
 
 /// Straight code.

@@ -255,6 +255,7 @@ impl<'a> Run<'a> {
                 return Ok(None);
             }
             Term::Fault(fault, site) => return Err(self.fail(*fault, *site)),
+            Term::Rethrow(code) => return Err(self.ctx.again(self.get(*code))),
         }))
     }
 

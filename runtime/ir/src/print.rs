@@ -45,7 +45,7 @@
 //! b1 catch b2:                         ; a fault leads to b2
 //!   switch v2 [1: b1, -5: b2] else b0
 //! b2:
-//!   return v2
+//!   return v2                          ; or: rethrow v2
 //! ```
 
 use crate::inst::{Base, Body, Const, Inst, Local, Mem, Term, Ty};
@@ -239,6 +239,7 @@ fn term(term: &Term, out: &mut String) -> fmt::Result {
         }
         Term::Return(Some(local)) => writeln!(out, "return {local}"),
         Term::Return(None) => writeln!(out, "return"),
+        Term::Rethrow(code) => writeln!(out, "rethrow {code}"),
         Term::Fault(fault, site) => {
             let facts = match fault {
                 Fault::Index { value, low, high } => format!(" {value} {low} {high}"),

@@ -153,6 +153,10 @@ b2:
   return
 b3:
   v4 = catch v6
+  branch v4, b4, b5
+b4:
+  rethrow v4
+b5:
   return
 body "Count" (i64, addr:8) -> i64 frame 16 @3
   local i64

@@ -59,6 +59,12 @@ pub(crate) unsafe extern "C" fn stated(ctx: *mut Context, site: u32, code: u32, 
     unsafe { &mut *ctx }.fail(fault, site)
 }
 
+/// A fault that was caught goes on.
+pub(crate) unsafe extern "C" fn again(ctx: *mut Context, code: u64) -> u32 {
+    // SAFETY: as in `index`.
+    unsafe { &mut *ctx }.again(code)
+}
+
 /// A native block or the engine has recorded a fault: what is missing is where.
 pub(crate) unsafe extern "C" fn stopped(ctx: *mut Context, site: u32, code: u32) -> u32 {
     // SAFETY: as in `index`.

@@ -57,7 +57,8 @@ impl Compiler<'_> {
         let effects = all_effects(&self.program);
         let unit_of: HashMap<usize, usize> = self.pous.iter().enumerate().filter_map(|(i, p)| Some((p.body?.0 as usize, i))).collect();
         let graph = CallGraph::new(&self.program);
-        let reached: Vec<Vec<usize>> = self.program.tasks.iter().map(|task| reached(&self.program, &graph, task.entry.0 as usize)).collect();
+        let reached: Vec<Vec<usize>> =
+            self.program.tasks.iter().map(|task| reached(&self.program, &graph, task.entry.0 as usize)).collect();
         for variable in self.shared() {
             let mut shares: Vec<Share> = Vec::new();
             for (task, bodies) in reached.iter().enumerate() {

@@ -233,7 +233,7 @@ fn mem(cursor: &Cursor<'_>, name: &str) -> Result<Mem, ParseError> {
 /// The end of the block, if it stands here.
 fn term(cursor: &mut Cursor<'_>) -> Result<Option<Term>, ParseError> {
     let word = cursor.peek();
-    if !["jump", "branch", "switch", "return", "fault"].contains(&word) {
+    if !["jump", "branch", "switch", "return", "fault", "rethrow"].contains(&word) {
         return Ok(None);
     }
     cursor.expect(word)?;
@@ -255,6 +255,7 @@ fn term(cursor: &mut Cursor<'_>) -> Result<Option<Term>, ParseError> {
         }
         "return" if number_behind(cursor.peek(), 'v').is_some() => Term::Return(Some(local(cursor)?)),
         "return" => Term::Return(None),
+        "rethrow" => Term::Rethrow(local(cursor)?),
         _ => Term::Fault(fault(cursor)?, site(cursor)?),
     }))
 }

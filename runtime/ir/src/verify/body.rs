@@ -170,6 +170,7 @@ impl Checker<'_> {
                 _ => Err(Defect::Result),
             },
             Term::Fault(_, site) => self.site(*site),
+            Term::Rethrow(code) => self.needs(*code, Ty::I64),
         }
     }
 

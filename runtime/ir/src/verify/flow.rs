@@ -66,7 +66,7 @@ fn successors(block: &Block) -> Vec<BlockId> {
         Term::Jump(target) => vec![*target],
         Term::Branch { then, other, .. } => vec![*then, *other],
         Term::Switch { cases, default, .. } => cases.iter().map(|(_, target)| *target).chain([*default]).collect(),
-        Term::Return(_) | Term::Fault(..) => vec![],
+        Term::Return(_) | Term::Fault(..) | Term::Rethrow(_) => vec![],
     }
 }
 

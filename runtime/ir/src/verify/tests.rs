@@ -225,11 +225,13 @@ fn polls(body: &Body) -> bool {
     // Blocks that lead to no block that is left lie on no loop.
     loop {
         let before = left.len();
+        let caught = |block: usize| body.blocks[block].handler.is_some_and(|t| left.contains(&(t.0 as usize)));
         let leads = |block: &usize| match &body.blocks[*block].term {
+            _ if caught(*block) => true,
             Term::Jump(t) => left.contains(&(t.0 as usize)),
             Term::Branch { then, other, .. } => left.contains(&(then.0 as usize)) || left.contains(&(other.0 as usize)),
             Term::Switch { cases, default, .. } => cases.iter().map(|(_, t)| t).chain([default]).any(|t| left.contains(&(t.0 as usize))),
-            Term::Return(_) | Term::Fault(..) => false,
+            Term::Return(_) | Term::Fault(..) | Term::Rethrow(_) => false,
         };
         let next: Vec<usize> = left.iter().copied().filter(leads).collect();
         left = next;

@@ -30,7 +30,7 @@ pub(super) fn targets(term: &Term) -> Vec<BlockId> {
         Term::Jump(target) => vec![*target],
         Term::Branch { then, other, .. } => vec![*then, *other],
         Term::Switch { cases, default, .. } => cases.iter().map(|(_, target)| *target).chain([*default]).collect(),
-        Term::Return(_) | Term::Fault(..) => Vec::new(),
+        Term::Return(_) | Term::Fault(..) | Term::Rethrow(_) => Vec::new(),
     }
 }
 
@@ -63,6 +63,11 @@ impl Lowering<'_, '_> {
             }
             Term::Switch { value, cases, default } => self.switch(*value, cases, *default),
             Term::Return(result) => self.return_(*result),
+            Term::Rethrow(code) => {
+                let code = self.get(*code);
+                let code = self.call_host(runtime::again as *const u8 as usize, &[self.ctx, code], Some(types::I32));
+                self.fail(code, self.handler);
+            }
             Term::Fault(fault, site) => {
                 let facts = fault.facts().map(|fact| self.int(fact));
                 let (site, code) = (i64::from(site.0), i64::from(fault.code()));

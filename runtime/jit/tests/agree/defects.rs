@@ -13,7 +13,7 @@ fn found_by(defect: Defect, programs: u64) -> Option<u64> {
 #[test]
 fn every_seeded_defect_is_found() {
     assert!(Defect::all().len() >= 20);
-    let found: Vec<(Defect, Option<u64>)> = Defect::all().iter().map(|defect| (*defect, found_by(*defect, 1500))).collect();
+    let found: Vec<(Defect, Option<u64>)> = Defect::all().iter().map(|defect| (*defect, found_by(*defect, 5000))).collect();
     for (defect, seed) in &found {
         println!("{defect:?}: {seed:?}");
     }

@@ -514,7 +514,8 @@ impl<'a> Generator<'a> {
         self.w.push(Inst::Catch { dst: code, depth: kept });
         self.observe(code);
         self.statements(depth + 1);
-        self.w.end(Term::Jump(next));
+        let term = if self.random.one_in(3) { Term::Rethrow(code) } else { Term::Jump(next) };
+        self.w.end(term);
         self.w.open(next);
     }
     /// The offset of an instance most times.
