@@ -24,6 +24,7 @@ mod initial;
 mod intrinsic;
 mod library;
 mod lint;
+mod mistake;
 mod namespace;
 mod object;
 mod operator;

@@ -40,12 +40,24 @@ impl<'a> Compiler<'a> {
         let (name, span) = (v.name.clone(), v.span);
         // What is assigned through a reference is somebody else's.
         let reads = READ | GIVEN | CALLED | if let Type::Reference(_) = self.types.get(v.ty) { WRITTEN } else { 0 };
+        if how == 0 && self.stands_in_a_branch(&name, span) {
+            return;
+        }
         if how == 0 {
             self.report(Code::Unused, span, format!("`{name}` is never used")).help = Some(unused_help(&name));
         } else if how & reads == 0 && self.lives_for_a_call(pou, v) && (how & PART == 0 || self.is_plain(v.ty)) {
             self.report(Code::NeverRead, span, format!("`{name}` is assigned, and its value is never used")).help =
                 Some(unused_help(&name));
         }
+    }
+
+    /// Whether the name stands elsewhere in a file with conditional pragmas: what they exclude may use it.
+    fn stands_in_a_branch(&self, name: &str, span: Span) -> bool {
+        let text = &self.files[span.file.0 as usize].text;
+        let excludes =
+            text.match_indices('{').any(|(at, _)| text[at + 1..].trim_start().get(..2).is_some_and(|w| w.eq_ignore_ascii_case("IF")));
+        let words = |c: char| !c.is_alphanumeric() && c != '_';
+        excludes && text.split(words).filter(|word| word.eq_ignore_ascii_case(name)).count() > 1
     }
 
     /// Whether nobody sees the variable behind the end of the call.
