@@ -84,7 +84,7 @@ impl<'a> Lowering<'_, 'a> {
     pub(crate) fn lint_call(&mut self, e: &'a Expr, result: &Operand) {
         let ExprKind::Call(callee, _) = &e.kind else { return };
         let ExprKind::Name(name) = &callee.kind else { return };
-        if !self.linted(e.span) || matches!(result.kind, Kind::Void) || !self.only_computes(name) {
+        if !self.linted(e.span) || matches!(result.kind, Kind::Void | Kind::Error) || !self.only_computes(name) {
             return;
         }
         let diagnostic = self.report(Code::ResultUnused, e.span, format!("the result of `{name}` is not used"));

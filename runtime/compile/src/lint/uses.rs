@@ -28,7 +28,7 @@ impl<'a> Compiler<'a> {
     fn lint_use(&mut self, pou: usize, i: usize, wanted: &str, known: &Known) {
         let v = &self.pous[pou].vars[i];
         let meant = v.name.starts_with('_') || !v.decl.pragmas.is_empty() || v.decl.at.is_some() || !v.decl.fb_init.is_empty();
-        if meant || !v.decl.fb_inits.is_empty() || self.constructs(v.ty) {
+        if meant || !v.decl.fb_inits.is_empty() || self.constructs(v.ty) || self.is_kept(pou, v.span) {
             return;
         }
         let units = known.seen_by.get(&pou).map_or(&[][..], Vec::as_slice);
@@ -49,6 +49,12 @@ impl<'a> Compiler<'a> {
             self.report(Code::NeverRead, span, format!("`{name}` is assigned, and its value is never used")).help =
                 Some(unused_help(&name));
         }
+    }
+
+    /// Whether a variable is RETAIN or PERSISTENT: what is kept may be there for others.
+    fn is_kept(&self, pou: usize, span: Span) -> bool {
+        let mut kept = self.pous[pou].tree.vars.iter().filter(|block| block.retain || block.persistent);
+        kept.any(|block| block.vars.iter().any(|decl| decl.name.span == span))
     }
 
     /// Whether the name stands elsewhere in a file with conditional pragmas: what they exclude may use it.
