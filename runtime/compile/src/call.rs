@@ -210,7 +210,7 @@ impl<'a> Lowering<'_, 'a> {
             }
         });
         self.assign_outputs(outputs);
-        let value = self.end_enable(enable, value, span);
+        let value = self.end_enable(enable, value);
         if failed { self.error(span) } else { value }
     }
 
@@ -496,7 +496,7 @@ impl<'a> Lowering<'_, 'a> {
             self.assign_output(arg, value);
         }
         let nothing = self.void(span);
-        self.end_enable(enable, nothing, span)
+        self.end_enable(enable, nothing)
     }
 
     fn invoke(&mut self, instance: &Operand, structure: &Structure, place: &Place, span: Span) {
@@ -608,7 +608,7 @@ impl<'a> Lowering<'_, 'a> {
             return self.error(span);
         }
         let value = self.native_with(desc, operands, span);
-        self.end_enable(enable, value, span)
+        self.end_enable(enable, value)
     }
 
     /// Calls a native function with as many operands as it has parameters.

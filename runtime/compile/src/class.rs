@@ -201,6 +201,12 @@ impl<'a> Compiler<'a> {
         self.interfaces[interface].all.iter().find_map(|i| Some((*i, *self.interfaces[*i].members.get(name)?)))
     }
 
+    /// The members of an interface and of what it extends.
+    pub(crate) fn interface_members(&self, interface: usize) -> Vec<&Member> {
+        let own = &self.interfaces[interface];
+        own.members.values().chain(own.extends.iter().flat_map(|i| self.interface_members(*i))).collect()
+    }
+
     /// The unit that a block runs for a method.
     pub(crate) fn unit_for(&self, pou: usize, method: &str) -> Option<usize> {
         let (name, part) = split(method);
@@ -418,7 +424,8 @@ impl<'a> Compiler<'a> {
     fn check_complete(&mut self, pou: usize) {
         let mut missing: Vec<String> = Vec::new();
         let bases: Vec<usize> = self.bases(pou).collect();
-        for base in &bases {
+        // A member that the block itself declares ABSTRACT has been reported.
+        for base in bases.iter().skip(1) {
             let mut abstract_: Vec<usize> =
                 self.pous[*base].members.values().flat_map(|m| [Part::Call, Part::Get, Part::Set].map(|p| m.part(p))).flatten().collect();
             abstract_.retain(|unit| self.pous[*unit].tree.modifiers.is_abstract);

@@ -81,9 +81,10 @@ impl<'a> Compiler<'a> {
             let unit = self.push_pou(head, library, Some(Owner::Pou(index)));
             self.add_member(&mut members, &action.name, Member::Action(unit));
         }
-        if let (PouKind::Function, Some(name)) = (kind, members.keys().next()) {
-            let message = format!("a FUNCTION has no methods, properties or actions, found `{name}`");
-            self.report(Code::BadStatement, tree.name.span, message);
+        let first = members.values().filter_map(|member| self.declared_member_at(*member)).min_by_key(|span| span.start);
+        if let (PouKind::Function, Some(span)) = (kind, first) {
+            self.report(Code::BadStatement, span, "a FUNCTION has no methods, properties or actions").help =
+                Some("make it a FUNCTION_BLOCK, or this a FUNCTION of its own".into());
         }
         self.pous[index].members = members;
         if let Some(base) = &tree.extends {
@@ -157,8 +158,9 @@ impl<'a> Compiler<'a> {
     }
 
     fn add_member(&mut self, members: &mut HashMap<String, Member>, name: &tree::Name, member: Member) {
-        if members.insert(key(&name.text), member).is_some() {
-            self.report(Code::DuplicateName, name.span, format!("`{}` is declared twice", name.text));
+        match members.get(&key(&name.text)) {
+            Some(first) => self.declared_twice(name, None, self.declared_member_at(*first)),
+            None => drop(members.insert(key(&name.text), member)),
         }
     }
 
@@ -198,11 +200,12 @@ impl<'a> Compiler<'a> {
             });
             match list {
                 Some(list) => {
-                    if self.lists[list].vars.insert(key(&decl.name.text), index).is_some() {
-                        let name = &self.lists[list].name;
-                        let message = format!("`{}` is declared twice in `{name}`", decl.name.text);
-                        self.report(Code::DuplicateName, decl.name.span, message);
+                    if let Some(first) = self.lists[list].vars.get(&key(&decl.name.text)) {
+                        let (first, within) = (self.globals[*first].decl.name.span, self.lists[list].name.clone());
+                        self.declared_twice(&decl.name, Some(&within), Some(first));
+                        continue;
                     }
+                    self.lists[list].vars.insert(key(&decl.name.text), index);
                     if !self.lists[list].qualified_only {
                         self.add_global(library, &decl.name.text, index);
                     }

@@ -5,7 +5,6 @@ use crate::place::Place;
 use crate::scope::key;
 use takt_abi::Section;
 use takt_ir::{Base, BlockId, Const, Inst, Local, Term, Ty};
-use takt_syntax::Span;
 use takt_syntax::tree::Arg;
 
 /// A call under EN, while it is being lowered.
@@ -43,7 +42,7 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     /// Ends a call; its result is 0 where it was not made.
-    pub(crate) fn end_enable(&mut self, enable: Option<Enable<'a>>, result: Operand, span: Span) -> Operand {
+    pub(crate) fn end_enable(&mut self, enable: Option<Enable<'a>>, result: Operand) -> Operand {
         let Some(Enable { condition, skip, end, eno }) = enable else { return result };
         let mut result = result;
         match result.kind.clone() {
@@ -76,7 +75,7 @@ impl<'a> Lowering<'_, 'a> {
         self.b.continue_in(end);
         if let Some(target) = eno.and_then(|arg| arg.value.as_ref()) {
             let ty = self.bool_type();
-            let value = self.exact(condition, ty, span);
+            let value = self.exact(condition, ty, target.span);
             let target = self.target(target);
             self.assign(target, value);
         }

@@ -414,7 +414,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
         if let Some(value) = v.value.clone() {
             return self.constant(value, ty, span);
         }
-        if *self.c.types.get(ty) == Type::Error {
+        if *self.c.types.get(ty) == Type::Error || constant && self.c.lacks_value(ty, v.decl) {
             return self.error(span);
         }
         let storage = self.storage_of(level, i);
@@ -446,7 +446,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
         self.at(place, ty, span)
     }
 
-    fn global_thing(&mut self, name: &str, span: Span) -> Thing {
+    pub(crate) fn global_thing(&mut self, name: &str, span: Span) -> Thing {
         match self.c.global_name(name) {
             Some(item) => self.item(item, name, span),
             None => {
@@ -458,7 +458,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                     return Thing::Value(Operand { flex: true, ..self.constant(Value::Int(0), ty, span) });
                 }
                 let help = self.suggest(name);
-                self.report(Code::UnknownName, span, format!("`{name}` is not declared")).help = help;
+                self.c.unknown_name(self.pou, name, span, help);
                 Thing::Error
             }
         }
@@ -532,6 +532,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
         }
         if let Some(value) = value {
             return self.constant(value, ty, span);
+        }
+        if constant && self.c.lacks_value(ty, self.c.globals[i].decl) {
+            return self.error(span);
         }
         let mut operand = self.stored(&storage, ty, span);
         if constant {
@@ -671,8 +674,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
     fn no_member(&mut self, operand: &Operand, member: &Name) -> Thing {
         let name = self.type_name(operand.ty);
         let help = match self.c.types.get(operand.ty) {
-            Type::Struct(s) => nearest(&key(&member.text), s.fields.iter().map(|f| key(&f.name)))
-                .and_then(|n| s.fields.iter().find(|f| key(&f.name) == n).map(|f| format!("did you mean `{}`?", f.name))),
+            Type::Struct(_) | Type::Interface(_) => {
+                let known = self.member_names(operand.ty);
+                nearest(&key(&member.text), known.iter().map(|n| key(n)))
+                    .and_then(|n| known.iter().find(|k| key(k) == n).map(|k| format!("did you mean `{k}`?")))
+            }
             Type::Pointer(_) => Some(format!("follow the pointer first: `^.{}`", member.text)),
             _ => None,
         };

@@ -4,13 +4,21 @@ use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand, Thing};
 use crate::operator::Class;
 use crate::place::Place;
-use crate::scope::{Member, Owner};
+use crate::scope::{Item, Member, Owner, PouKind};
 use takt_abi::Elem;
 use takt_ir::{Base, Inst, Local, Op, Term, Ty, Type, TypeId, heap};
 use takt_syntax::tree::{Arg, Expr, ExprKind};
 use takt_syntax::{Code, Span};
 
 impl<'a> Lowering<'_, 'a> {
+    fn names_type(&self, name: &str) -> bool {
+        match self.c.global_name(name) {
+            Some(Item::Pou(pou)) => self.c.pous[pou].tree.kind == PouKind::FunctionBlock,
+            Some(Item::Type(_) | Item::Ready(_) | Item::NativeBlock(_)) => true,
+            _ => false,
+        }
+    }
+
     /// `__NEW(type)`, `__NEW(type, count)`, `__NEW(block(arguments of FB_Init))`.
     pub(crate) fn new_instance(&mut self, args: &'a [Arg], span: Span) -> Operand {
         let (what, count) = match args {
@@ -26,7 +34,13 @@ impl<'a> Lowering<'_, 'a> {
             ExprKind::Call(callee, init) => (callee, init),
             _ => (what, &[]),
         };
-        let ty = match self.thing(callee) {
+        // A variable may have the name of its type in other letters: `fb : FB`.
+        let hidden = matches!(&callee.kind, ExprKind::Name(name) if self.names_type(name));
+        let found = match &callee.kind {
+            ExprKind::Name(name) if hidden => self.global_thing(name, callee.span),
+            _ => self.thing(callee),
+        };
+        let ty = match found {
             Thing::Type(ty) => ty,
             Thing::Error => return self.error(span),
             _ => {

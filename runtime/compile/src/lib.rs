@@ -25,6 +25,7 @@ mod initial;
 mod intrinsic;
 mod library;
 mod lint;
+mod mistake;
 mod namespace;
 mod object;
 mod operator;

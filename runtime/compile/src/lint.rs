@@ -13,7 +13,7 @@ mod uses;
 use crate::scope::{Member, Owner, key};
 use crate::unit::Compiler;
 use std::collections::{HashMap, HashSet};
-use takt_syntax::{Severity, Span};
+use takt_syntax::{Code, Diagnostic, Severity, Span};
 
 /// What all units say of names, by key.
 struct Known {
@@ -35,7 +35,7 @@ impl<'a> Compiler<'a> {
 
     /// Looks for likely mistakes in a program without errors.
     pub(crate) fn lint(&mut self) {
-        if !self.options.lint || self.diagnostics.iter().any(|d| d.severity() == Severity::Error) {
+        if !self.options.lint || self.diagnostics.iter().any(spoils) {
             return;
         }
         let known = self.known_names();
@@ -78,4 +78,9 @@ impl<'a> Compiler<'a> {
         let all = blocks.chain(self.interfaces.iter().flat_map(|interface| &interface.members));
         all.filter(|(_, member)| matches!(member, Member::Property { .. })).map(|(name, _)| name.clone()).collect()
     }
+}
+
+/// Whether a message says that the program may not be what was meant. Functions without a program to run are complete.
+fn spoils(diagnostic: &Diagnostic) -> bool {
+    diagnostic.severity() == Severity::Error && diagnostic.code != Code::NoProgram
 }

@@ -99,6 +99,23 @@ impl<'a> Lowering<'_, 'a> {
         Some(Thing::Member(Box::new(Bound { instance, member, of, name: wanted.into() })))
     }
 
+    /// Names of the fields, methods, properties and actions of a type, as they are spelled.
+    pub(crate) fn member_names(&self, ty: TypeId) -> Vec<String> {
+        let mut names: Vec<String> = match self.c.types.get(ty) {
+            Type::Struct(s) => s.fields.iter().map(|f| f.name.clone()).collect(),
+            _ => Vec::new(),
+        };
+        let of_block =
+            self.c.pou_of_type.get(&ty).into_iter().flat_map(|pou| self.c.bases(*pou)).flat_map(|b| self.c.pous[b].members.values());
+        let of_interface = self.c.interface_of_type.get(&ty).into_iter().flat_map(|i| self.c.interface_members(*i));
+        let units = of_block.chain(of_interface).filter_map(|member| match *member {
+            Member::Method(unit) | Member::Action(unit) => Some(unit),
+            Member::Property { get, set } => get.or(set),
+        });
+        names.extend(units.map(|unit| self.c.pous[unit].tree.name.text.clone()));
+        names
+    }
+
     fn check_access(&mut self, unit: usize, at: Span) {
         let Some(Owner::Pou(holder)) = self.c.pous[unit].owner else { return };
         let head = self.c.pous[unit].tree;

@@ -453,13 +453,13 @@ impl<'a> Lowering<'_, 'a> {
         if operand.is_error() || !usable {
             return None;
         }
+        if !matches!(operand.kind, Kind::Const(_)) {
+            self.report(Code::NotConstant, e.span, "a CASE label must be a constant");
+            return None;
+        }
         match self.convert(operand, ty).kind {
             Kind::Const(Value::Int(v)) => Some(v),
-            Kind::Error => None,
-            _ => {
-                self.report(Code::NotConstant, e.span, "a CASE label must be a constant");
-                None
-            }
+            _ => None,
         }
     }
 

@@ -178,8 +178,7 @@ impl<'a> Compiler<'a> {
                 if let (Some(ty), false) = (ty, direct) {
                     return ty;
                 }
-                self.report(Code::Circular, at, format!("`{}` contains itself", tree.name.text)).help =
-                    Some("use POINTER TO or REFERENCE TO to break the cycle".into());
+                self.contains_itself(&tree.name, at);
                 return self.error_type();
             }
             (_, Some(ty)) if !direct => return ty,
@@ -195,7 +194,9 @@ impl<'a> Compiler<'a> {
         }
         self.declared[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.declared[index].home);
+        self.inside.push((&tree.name, at));
         let ty = self.define(index, tree);
+        self.inside.pop();
         self.home = home;
         self.declared[index].ty = Some(ty);
         self.declared[index].state = Progress::Done;
@@ -259,7 +260,8 @@ impl<'a> Compiler<'a> {
                 next = self.enum_value(expr, pou, &members).unwrap_or(next);
             }
             if members.iter().any(|(n, _)| key(n) == key(&member.text)) {
-                self.report(Code::DuplicateName, member.span, format!("`{}` is declared twice in this enumeration", member.text));
+                let first = body.members.iter().find(|(n, _)| key(&n.text) == key(&member.text)).map(|(n, _)| n.span);
+                self.declared_twice(member, Some(name).filter(|n| !n.starts_with('(')), first);
             }
             let (low, high) = range(base);
             if !(low..=high).contains(&next) {
@@ -347,7 +349,8 @@ impl<'a> Compiler<'a> {
         for decl in decls {
             let ty = self.variable_type(decl, None);
             if fields.iter().any(|f| key(&f.name) == key(&decl.name.text)) {
-                self.report(Code::DuplicateName, decl.name.span, format!("`{}` is declared twice in `{name}`", decl.name.text));
+                let first = decls.iter().find(|d| key(&d.name.text) == key(&decl.name.text) && d.name.span != decl.name.span);
+                self.declared_twice(&decl.name, Some(name), first.map(|d| d.name.span));
             }
             let (size, align) = self.types.layout(ty);
             // Instances of classes are found at multiples of their granule only.
@@ -415,6 +418,7 @@ impl<'a> Compiler<'a> {
             self.report(Code::TypeMismatch, decl.ty.span, "ARRAY[*] is only possible as VAR_IN_OUT");
             return self.error_type();
         }
+        self.check_arguments_of_init(decl, ty);
         if let Some(name) = self.abstract_block(ty) {
             self.report(Code::Abstract, decl.ty.span, format!("`{name}` is ABSTRACT and has no instances")).help =
                 Some(format!("declare a block that extends it, or `REFERENCE TO {name}`"));
@@ -438,10 +442,8 @@ impl<'a> Compiler<'a> {
         match self.pous[index].state {
             Progress::Done => return,
             Progress::Running => {
-                let name = self.pous[index].tree.name.text.clone();
                 if matches!(self.pous[index].tree.kind, PouKind::FunctionBlock | PouKind::Program) {
-                    self.report(Code::Circular, at, format!("`{name}` contains itself")).help =
-                        Some("use POINTER TO or REFERENCE TO to break the cycle".into());
+                    self.contains_itself(self.pous[index].tree.name, at);
                 }
                 return;
             }
@@ -454,6 +456,7 @@ impl<'a> Compiler<'a> {
                 self.resolve_pou(other, at);
             }
         }
+        self.inside.push((tree.name, at));
         self.pous[index].result = tree.result.map(|t| self.type_expr(t, Some(index), true));
         for block in tree.vars {
             for decl in &block.vars {
@@ -463,6 +466,7 @@ impl<'a> Compiler<'a> {
         if matches!(tree.kind, PouKind::FunctionBlock | PouKind::Program) {
             self.lay_out_instance(index);
         }
+        self.inside.pop();
         self.home = home;
         self.pous[index].state = Progress::Done;
     }
@@ -477,6 +481,10 @@ impl<'a> Compiler<'a> {
                 );
             }
             return;
+        }
+        if let Some(first) = self.pous[index].index.get(&key(&decl.name.text)) {
+            let first = self.pous[index].vars[*first].span;
+            return self.declared_twice(&decl.name, None, Some(first));
         }
         let ty =
             if block.kind == VarKind::InOut { self.type_expr(&decl.ty, Some(index), true) } else { self.variable_type(decl, Some(index)) };
@@ -504,12 +512,7 @@ impl<'a> Compiler<'a> {
             span: decl.name.span,
         };
         self.pous[index].vars.push(variable);
-        if let Some(first) = self.pous[index].index.insert(key(&decl.name.text), position) {
-            let first = self.pous[index].vars[first].span;
-            self.report(Code::DuplicateName, decl.name.span, format!("`{}` is declared twice", decl.name.text))
-                .notes
-                .push(takt_syntax::Note { span: first, message: "first declared here".into() });
-        }
+        self.pous[index].index.insert(key(&decl.name.text), position);
     }
 
     fn lay_out_instance(&mut self, index: usize) {
@@ -599,15 +602,17 @@ impl<'a> Compiler<'a> {
         match self.globals[index].state {
             Progress::Done => return,
             Progress::Running => {
-                self.report(Code::Circular, decl.name.span, format!("`{}` depends on itself", decl.name.text));
+                self.depends_on_itself(&decl.name);
                 return;
             }
             Progress::Untouched => self.globals[index].state = Progress::Running,
         }
         let home = std::mem::replace(&mut self.home, self.globals[index].home);
+        self.inside.push((&decl.name, decl.name.span));
         let ty = self.variable_type(decl, None);
         let constant = self.globals[index].constant;
         let value = if constant && decl.init.is_some() { self.constant_of(decl, ty, None) } else { None };
+        self.inside.pop();
         self.home = home;
         self.globals[index].var = Some(Variable {
             name: decl.name.text.clone(),

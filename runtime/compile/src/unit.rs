@@ -53,6 +53,10 @@ pub(crate) struct Compiler<'a> {
     pub(crate) namespaces: Vec<String>,
     /// The namespaces around what is being looked at, if there are any.
     pub(crate) home: Option<&'a tree::Home>,
+    /// What is being resolved, and where each is named by the one before.
+    pub(crate) inside: Vec<(&'a tree::Name, Span)>,
+    /// Names that were reported as unknown, per unit: numbers of their messages.
+    pub(crate) unknown: HashMap<(Option<usize>, String), usize>,
     /// The program uses `__NEW`.
     pub(crate) heap: bool,
     pub(crate) native_blocks: HashMap<TypeId, &'static takt_abi::BlockDesc>,
@@ -103,6 +107,8 @@ impl<'a> Compiler<'a> {
             type_late: HashMap::new(),
             namespaces: Vec::new(),
             home: None,
+            inside: Vec::new(),
+            unknown: HashMap::new(),
             heap: false,
             native_blocks: HashMap::new(),
             type_init: HashMap::new(),

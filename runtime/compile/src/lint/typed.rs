@@ -84,7 +84,7 @@ impl<'a> Lowering<'_, 'a> {
     pub(crate) fn lint_call(&mut self, e: &'a Expr, result: &Operand) {
         let ExprKind::Call(callee, _) = &e.kind else { return };
         let ExprKind::Name(name) = &callee.kind else { return };
-        if !self.linted(e.span) || matches!(result.kind, Kind::Void) || !self.only_computes(name) {
+        if !self.linted(e.span) || matches!(result.kind, Kind::Void | Kind::Error) || !self.only_computes(name) {
             return;
         }
         let diagnostic = self.report(Code::ResultUnused, e.span, format!("the result of `{name}` is not used"));
@@ -133,11 +133,8 @@ impl<'a> Lowering<'_, 'a> {
 
     /// Whether a pointer to `wanted` is at home on a `found`: bytes of anything, first elements, related types, texts of other lengths.
     fn points_at(&self, wanted: TypeId, found: TypeId) -> bool {
-        let bytes = |ty: TypeId| match self.c.types.get(ty) {
-            Type::Elem(Elem::Byte | Elem::Usint | Elem::Sint | Elem::Char) => true,
-            Type::Error => true,
-            _ => false,
-        };
+        let bytes =
+            |ty: TypeId| matches!(self.c.types.get(ty), Type::Elem(Elem::Byte | Elem::Usint | Elem::Sint | Elem::Char) | Type::Error);
         let element = |ty: TypeId| match self.c.types.get(ty) {
             Type::Array { elem, .. } => Some(*elem),
             _ => None,

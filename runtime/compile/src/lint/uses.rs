@@ -28,7 +28,7 @@ impl<'a> Compiler<'a> {
     fn lint_use(&mut self, pou: usize, i: usize, wanted: &str, known: &Known) {
         let v = &self.pous[pou].vars[i];
         let meant = v.name.starts_with('_') || !v.decl.pragmas.is_empty() || v.decl.at.is_some() || !v.decl.fb_init.is_empty();
-        if meant || !v.decl.fb_inits.is_empty() || self.constructs(v.ty) {
+        if meant || !v.decl.fb_inits.is_empty() || self.constructs(v.ty) || self.is_kept(pou, v.span) {
             return;
         }
         let units = known.seen_by.get(&pou).map_or(&[][..], Vec::as_slice);
@@ -40,12 +40,30 @@ impl<'a> Compiler<'a> {
         let (name, span) = (v.name.clone(), v.span);
         // What is assigned through a reference is somebody else's.
         let reads = READ | GIVEN | CALLED | if let Type::Reference(_) = self.types.get(v.ty) { WRITTEN } else { 0 };
+        if how == 0 && self.stands_in_a_branch(&name, span) {
+            return;
+        }
         if how == 0 {
             self.report(Code::Unused, span, format!("`{name}` is never used")).help = Some(unused_help(&name));
         } else if how & reads == 0 && self.lives_for_a_call(pou, v) && (how & PART == 0 || self.is_plain(v.ty)) {
             self.report(Code::NeverRead, span, format!("`{name}` is assigned, and its value is never used")).help =
                 Some(unused_help(&name));
         }
+    }
+
+    /// Whether a variable is RETAIN or PERSISTENT: what is kept may be there for others.
+    fn is_kept(&self, pou: usize, span: Span) -> bool {
+        let mut kept = self.pous[pou].tree.vars.iter().filter(|block| block.retain || block.persistent);
+        kept.any(|block| block.vars.iter().any(|decl| decl.name.span == span))
+    }
+
+    /// Whether the name stands elsewhere in a file with conditional pragmas: what they exclude may use it.
+    fn stands_in_a_branch(&self, name: &str, span: Span) -> bool {
+        let text = &self.files[span.file.0 as usize].text;
+        let excludes =
+            text.match_indices('{').any(|(at, _)| text[at + 1..].trim_start().get(..2).is_some_and(|w| w.eq_ignore_ascii_case("IF")));
+        let words = |c: char| !c.is_alphanumeric() && c != '_';
+        excludes && text.split(words).filter(|word| word.eq_ignore_ascii_case(name)).count() > 1
     }
 
     /// Whether nobody sees the variable behind the end of the call.
