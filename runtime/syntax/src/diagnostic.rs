@@ -109,6 +109,7 @@ codes! {
     E0315 BadOverride "a method or block does not go with what it overrides or extends",
     E0316 NotImplemented "a block lacks a member that its base or interface asks for",
     E0317 Abstract "an abstract block or method is used as if it had a body",
+    E0320 BadAddress "a direct address does not exist or does not go with what lies there",
     E0401 NoProgram "nothing to run: no program or task",
     E0402 BadTask "a task or configuration is not usable",
     E0403 TooLarge "the program needs more memory than an application may have",
@@ -121,6 +122,8 @@ codes! {
     W0303 SharedData "two tasks use a variable and one may see it half changed",
     W0304 NeverAssigned "a result is never assigned",
     W0305 ConstantOverflow "a constant does not fit and is cut",
+    W0310 SharedAddress "two variables lie at addresses that overlap",
+    W0311 NoAddress "a variable waits for an address and gets none",
 }
 
 /// The page of a code such as `E0301`, in any case of its letter; `None` if there is no such code.
