@@ -2,10 +2,12 @@
 
 use crate::constant::Value;
 use crate::emit::Builder;
+use crate::expression::Kind;
 use crate::initial::Known;
+use crate::place::Place;
 use crate::scope::{Item, PouKind, key};
 use crate::unit::Compiler;
-use takt_ir::{BodyId, Inst, Task, Term, Trigger};
+use takt_ir::{Base, BodyId, Inst, Task, Term, Trigger};
 use takt_syntax::tree::{self, Unit};
 use takt_syntax::{Code, FileId, Span};
 
@@ -183,12 +185,11 @@ impl<'a> Compiler<'a> {
         let operand = scratch.expr(value);
         let bool_type = scratch.bool_type();
         match operand.kind {
-            crate::expression::Kind::Place(crate::place::Place::Memory { base: takt_ir::Base::Image, offset })
-                if operand.ty == bool_type =>
-            {
-                Some(Trigger::Event(offset))
+            Kind::Place(Place::Memory { base: Base::Image, offset }) if operand.ty == bool_type => Some(Trigger::Event(offset, None)),
+            Kind::Place(Place::Bits { whole, shift, width: 1, .. }) if let Place::Memory { base: Base::Image, offset } = *whole => {
+                Some(Trigger::Event(offset + shift / 8, Some((shift % 8) as u8)))
             }
-            crate::expression::Kind::Error => None,
+            Kind::Error => None,
             _ => {
                 self.report(Code::BadTask, value.span, "SINGLE needs a global BOOL variable");
                 None

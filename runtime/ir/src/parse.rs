@@ -176,7 +176,10 @@ fn task(cursor: &mut Cursor<'_>) -> Result<Task, ParseError> {
     let name = cursor.text()?;
     let trigger = match cursor.word()? {
         "cyclic" => Trigger::Cyclic(cursor.number()?),
-        "event" => Trigger::Event(cursor.number()?),
+        "event" => {
+            let offset = cursor.number()?;
+            Trigger::Event(offset, if cursor.accept("bit") { Some(cursor.number()?) } else { None })
+        }
         "freewheeling" => Trigger::Freewheeling,
         other => return Err(cursor.wrong_last(&format!("expected `cyclic`, `event` or `freewheeling`, found `{other}`"))),
     };

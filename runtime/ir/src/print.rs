@@ -110,7 +110,8 @@ impl Printer<'_> {
             write!(out, "task {} ", Quoted(&task.name))?;
             match task.trigger {
                 Trigger::Cyclic(period) => write!(out, "cyclic {period}")?,
-                Trigger::Event(offset) => write!(out, "event {offset}")?,
+                Trigger::Event(offset, None) => write!(out, "event {offset}")?,
+                Trigger::Event(offset, Some(bit)) => write!(out, "event {offset} bit {bit}")?,
                 Trigger::Freewheeling => write!(out, "freewheeling")?,
             }
             writeln!(out, " priority {} entry {} stack {} {}", task.priority, task.entry.0, task.stack.0, task.stack.1)?;

@@ -35,8 +35,8 @@ pub struct Site {
 pub enum Trigger {
     /// Every so many nanoseconds.
     Cyclic(i64),
-    /// Rising edge of the BOOL at this offset.
-    Event(u32),
+    /// Rising edge of the BOOL at this offset, or of a bit of the byte there.
+    Event(u32, Option<u8>),
     /// As often as possible.
     Freewheeling,
 }

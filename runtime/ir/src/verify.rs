@@ -228,7 +228,7 @@ fn tasks(program: &Program) -> Result<(), Defect> {
         ensure(fine, Defect::Stack(i))?;
         let possible = match task.trigger {
             Trigger::Cyclic(period) => period > 0,
-            Trigger::Event(offset) => in_image(program, offset, 1),
+            Trigger::Event(offset, bit) => in_image(program, offset, 1) && bit.is_none_or(|bit| bit < 8),
             Trigger::Freewheeling => true,
         };
         ensure(possible, Defect::Trigger(i))?;

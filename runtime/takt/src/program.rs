@@ -56,7 +56,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
     let options = takt_compile::Options {
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
-        byte_addresses: project.manifest.addressing == Addressing::Byte,
+        byte_addresses: project.manifest.addressing.map_or(project.sources.are_twincat(), |addressing| addressing == Addressing::Byte),
         wired: project.manifest.wires.iter().map(|wire| wire.variable.value.clone()).collect(),
         heap: project.manifest.heap,
         defines: project.manifest.defines.clone(),

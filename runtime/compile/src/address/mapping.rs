@@ -3,7 +3,7 @@
 use super::Section;
 use crate::scope::key;
 use crate::unit::Compiler;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use takt_ir::{Address, Area, Mapped, Program, StructKind, Type, TypeId};
 use takt_syntax::tree::{VarDecl, VarKind};
 use takt_syntax::{Code, Note, Span};
@@ -22,6 +22,8 @@ struct Found {
     span: Span,
     offset: u32,
     ty: TypeId,
+    /// Stands for others in the same array too.
+    many: bool,
 }
 
 impl<'a> Compiler<'a> {
@@ -77,8 +79,9 @@ impl<'a> Compiler<'a> {
         let wired = self.options.wired.iter().filter_map(|path| takt_ir::resolve(program, path).ok());
         let wired: HashSet<(u32, TypeId)> = wired.map(|place| (place.offset, place.ty)).collect();
         let mut mapped = Vec::new();
-        let mut left: Vec<(Span, String, usize)> = Vec::new();
-        self.each_waiting(program, &mut |c, found, path| {
+        let mut left: Vec<(Span, String, bool)> = Vec::new();
+        let known = given.keys().chain(&wired).map(|(offset, _)| *offset).collect();
+        self.each_waiting(program, known, &mut |c, found, path| {
             let place = (found.offset, found.ty);
             match given.get_mut(&place) {
                 Some((entry, used)) => {
@@ -88,8 +91,8 @@ impl<'a> Compiler<'a> {
                 }
                 None if wired.contains(&place) => {}
                 None => match left.iter_mut().rev().find(|(span, ..)| *span == found.span) {
-                    Some((.., count)) => *count += 1,
-                    None => left.push((found.span, path.to_owned(), 1)),
+                    Some((.., others)) => *others = true,
+                    None => left.push((found.span, path.to_owned(), found.many)),
                 },
             }
         });
@@ -104,12 +107,10 @@ impl<'a> Compiler<'a> {
         self.warn_of_left(left);
     }
 
-    fn warn_of_left(&mut self, left: Vec<(Span, String, usize)>) {
-        for (span, path, count) in left {
-            let message = match count {
-                1 => format!("nothing gives `{path}` an address"),
-                _ => format!("nothing gives `{path}` (and {} more of its kind) an address", count - 1),
-            };
+    fn warn_of_left(&mut self, left: Vec<(Span, String, bool)>) {
+        for (span, path, others) in left {
+            let others = if others { " and others of its kind" } else { "" };
+            let message = format!("nothing gives `{path}`{others} an address");
             self.report(Code::NoAddress, span, message).help =
                 Some(format!("write `{path} AT …` in VAR_CONFIG, or wire \"{path}\" in the [io] section of takt.toml"));
         }
@@ -148,8 +149,8 @@ impl<'a> Compiler<'a> {
         Some(Mapped { area: found.area, ty, offset: found.offset, address: offset, bit: address.bit })
     }
 
-    /// Finds every instance that waits for an address, with its path.
-    fn each_waiting(&mut self, program: &Program, found: &mut dyn FnMut(&mut Self, Found, &str)) {
+    /// Finds the instances that wait for an address, with their paths; of those in arrays the ones at `known` offsets and one that stands for the others.
+    fn each_waiting(&mut self, program: &Program, known: BTreeSet<u32>, found: &mut dyn FnMut(&mut Self, Found, &str)) {
         if self.addresses.waiting.is_empty() && self.addresses.waiting_globals.is_empty() {
             return;
         }
@@ -157,10 +158,10 @@ impl<'a> Compiler<'a> {
             let name = self.global_path(i);
             if let Some(global) = program.globals.iter().find(|global| global.name == name) {
                 let Waiting { area, span, .. } = waiting;
-                found(self, Found { area, span, offset: global.offset, ty: global.ty }, &name);
+                found(self, Found { area, span, offset: global.offset, ty: global.ty, many: false }, &name);
             }
         }
-        let mut walk = Walk { types: &program.types, holds: HashMap::new(), path: String::new() };
+        let mut walk = Walk { types: &program.types, known, holds: HashMap::new(), path: String::new(), many: false };
         let mut seen = HashSet::new();
         for global in &program.globals {
             if seen.insert((global.offset, global.ty)) {
@@ -182,8 +183,11 @@ impl<'a> Compiler<'a> {
 /// A walk through the members of variables.
 struct Walk<'t> {
     types: &'t takt_ir::Types,
+    known: BTreeSet<u32>,
     holds: HashMap<TypeId, bool>,
     path: String,
+    /// What is looked at stands for other elements too.
+    many: bool,
 }
 
 impl Walk<'_> {
@@ -195,12 +199,19 @@ impl Walk<'_> {
         let types = self.types;
         match types.get(ty) {
             Type::Array { elem, dims } => {
-                let size = types.size(*elem);
-                for (n, indices) in indices(dims).enumerate() {
-                    self.path.push_str(&indices);
-                    self.inside(c, *elem, offset + n as u32 * size, found);
+                let (size, many) = (types.size(*elem).max(1), self.many);
+                let count = types.size(ty) / size;
+                let mut chosen: BTreeSet<u32> = self.known.range(offset..offset + count * size).map(|at| (at - offset) / size).collect();
+                let other = (0..count).find(|n| !chosen.contains(n));
+                let left = count as usize - chosen.len();
+                chosen.extend(other);
+                for n in chosen {
+                    self.many = many || Some(n) == other && left > 1;
+                    self.path.push_str(&indices(dims, n));
+                    self.inside(c, *elem, offset + n * size, found);
                     self.path.truncate(len);
                 }
+                self.many = many;
             }
             Type::Struct(s) => {
                 for field in s.fields.iter().filter(|f| f.section != takt_abi::Section::InOut) {
@@ -209,7 +220,7 @@ impl Walk<'_> {
                     let at = offset + field.offset;
                     let waiting = c.waiting_in(ty).find(|w| key(&w.name) == key(&field.name)).map(|w| (w.area, w.span));
                     if let Some((area, span)) = waiting {
-                        found(c, Found { area, span, offset: at, ty: field.ty }, &self.path);
+                        found(c, Found { area, span, offset: at, ty: field.ty, many: self.many }, &self.path);
                     }
                     self.inside(c, field.ty, at, found);
                     self.path.truncate(len);
@@ -238,18 +249,15 @@ impl Walk<'_> {
     }
 }
 
-/// The indices of an array's elements as they are written, in order.
-fn indices(dims: &[(i64, i64)]) -> impl Iterator<Item = String> {
-    let count: u64 = dims.iter().map(|(low, high)| (high - low + 1).max(0) as u64).product();
-    (0..count).map(|n| {
-        let mut rest = n;
-        let mut parts: Vec<String> = Vec::new();
-        for (low, high) in dims.iter().rev() {
-            let len = (high - low + 1).max(1) as u64;
-            parts.push((low + (rest % len) as i64).to_string());
-            rest /= len;
-        }
-        parts.reverse();
-        format!("[{}]", parts.join(", "))
-    })
+/// The indices of the element with that number as they are written.
+fn indices(dims: &[(i64, i64)], number: u32) -> String {
+    let mut rest = u64::from(number);
+    let mut parts: Vec<String> = Vec::new();
+    for (low, high) in dims.iter().rev() {
+        let len = (high - low + 1).max(1) as u64;
+        parts.push((low + (rest % len) as i64).to_string());
+        rest /= len;
+    }
+    parts.reverse();
+    format!("[{}]", parts.join(", "))
 }
