@@ -149,7 +149,9 @@ impl<'a> Lowering<'_, 'a> {
         let before = self.c.diagnostics.len();
         let mut words: Vec<Option<Vec<Local>>> = vec![None; vars.len()];
         for (i, operand) in preset {
-            words[i] = vars.get(i).and_then(|v| self.pass(v, operand));
+            if let Some(v) = vars.get(i) {
+                words[i] = self.pass(v, operand);
+            }
         }
         for wanted in [VarKind::Input, VarKind::InOut] {
             for (i, arg) in matched.iter().filter(|(i, _)| vars[*i].kind == wanted) {
