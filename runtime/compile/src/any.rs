@@ -210,6 +210,7 @@ impl<'a> Lowering<'_, 'a> {
                 Elem::Char => 44,
                 Elem::Wchar => 45,
             },
+            Type::Bit(_) => 1,
             Type::String(_) => 16,
             Type::WString(_) => 17,
             Type::Pointer(_) => 22,

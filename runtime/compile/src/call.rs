@@ -177,7 +177,9 @@ impl<'a> Lowering<'_, 'a> {
         let before = self.c.diagnostics.len();
         let mut words: Vec<Option<Vec<Local>>> = vec![None; vars.len()];
         for (i, operand) in preset {
-            words[i] = vars.get(i).and_then(|v| self.pass(v, operand));
+            if let Some(v) = vars.get(i) {
+                words[i] = self.pass(v, operand);
+            }
         }
         for wanted in [VarKind::Input, VarKind::InOut] {
             for (i, arg) in matched.iter().filter(|(i, _)| vars[*i].kind == wanted) {
@@ -403,7 +405,8 @@ impl<'a> Lowering<'_, 'a> {
             // CODESYS programs hand an output such as SMC_ReadNCFile2.sentences on to the next block.
             (Kind::Place(place @ Place::Memory { .. }), None | Some(BLOCK_OUTPUT)) => place.clone(),
             (Kind::Place(Place::Bits { .. }), None) => {
-                self.report(Code::BadArgument, operand.span, format!("a bit of a number cannot be passed to the VAR_IN_OUT `{name}`"));
+                self.report(Code::BadArgument, operand.span, format!("a single bit cannot be passed to the VAR_IN_OUT `{name}`")).help =
+                    Some("pass a BOOL variable and assign it to the bit behind the call".into());
                 return None;
             }
             (_, why) => {
@@ -575,6 +578,11 @@ impl<'a> Lowering<'_, 'a> {
                 };
                 let ty = self.c.types.intern(Type::Pointer(to));
                 self.exact(pointer, ty, span)
+            }
+            Kind::Place(Place::Bits { .. }) => {
+                self.report(Code::BadArgument, span, "a single bit has no address").help =
+                    Some("point to a BOOL variable or to the whole byte; `BITADR` gives the number of a bit in its area".into());
+                self.error(span)
             }
             _ => {
                 self.report(Code::BadArgument, span, "only a variable has an address");

@@ -186,14 +186,16 @@ impl<'a> Compiler<'a> {
     }
 
     fn collect_list_block(&mut self, library: bool, list: Option<usize>, block: &'a tree::VarBlock) {
+        if block.kind == VarKind::Config {
+            return self.addresses.configured.extend(&block.vars);
+        }
         for decl in &block.vars {
             let index = self.globals.len();
-            let kind = if block.kind == VarKind::Config { VarKind::Config } else { VarKind::Global };
             self.globals.push(GlobalVar {
                 var: None,
                 list,
                 decl,
-                kind,
+                kind: VarKind::Global,
                 home: self.home,
                 constant: block.constant,
                 state: Progress::Untouched,

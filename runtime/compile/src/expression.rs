@@ -357,11 +357,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 Thing::Error
             }
             ExprKind::Call(callee, args) => Thing::Value(self.call(callee, args, e.span)),
-            ExprKind::Direct(direct) => {
-                self.report(Code::NotSupported, direct.span, "a direct address is not supported in an expression").help =
-                    Some("declare a variable in VAR_GLOBAL and wire it in takt.toml".into());
-                Thing::Error
-            }
+            ExprKind::Direct(direct) => self.direct(direct),
             ExprKind::Error => Thing::Error,
             _ => Thing::Value(self.expr(e)),
         }
@@ -433,6 +429,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
     pub(crate) fn stored(&mut self, storage: &Storage, ty: TypeId, span: Span) -> Operand {
         let place = match storage {
             Storage::Image(offset) => Place::Memory { base: Base::Image, offset: *offset },
+            Storage::Bit(offset, bit) => {
+                let byte = Place::Memory { base: Base::Image, offset: *offset };
+                let bit = self.c.types.intern(Type::Bit(*bit));
+                self.bit_place(byte, bit).0
+            }
             Storage::This(offset) => match self.this {
                 Some(this) => Place::Memory { base: Base::Local(this), offset: *offset },
                 None => Place::Memory { base: Base::Image, offset: takt_ir::NULL_ZONE },
@@ -631,6 +632,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
         if let Some((value, ty)) = constant {
             return Thing::Value(self.constant(value, ty, span));
         }
+        if let (None, Some(value)) = (&found, unit.and_then(|unit| self.fixed_member(unit, &wanted, member.span))) {
+            return Thing::Value(value);
+        }
         let Some(field) = found else { return self.no_member(&operand, member) };
         // A block sees all of its own type and of what it extends: `THIS^.x`.
         let related = |unit: usize| self.block().is_some_and(|c| self.c.is_a(c, Owner::Pou(unit)) || self.c.is_a(unit, Owner::Pou(c)));
@@ -653,7 +657,8 @@ impl<'c, 'a> Lowering<'c, 'a> {
         {
             return Thing::Value(Operand { dynamic: true, ..self.in_out_at(base, offset, field.ty, span) });
         }
-        let mut value = self.at(place.inside(field.offset), field.ty, span);
+        let (place, ty) = self.bit_place(place.inside(field.offset), field.ty);
+        let mut value = self.at(place, ty, span);
         value.fixed = operand.fixed;
         if foreign && field.section == Section::Output {
             value.fixed = Some(BLOCK_OUTPUT);

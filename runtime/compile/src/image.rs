@@ -29,6 +29,7 @@ impl<'a> Compiler<'a> {
 
     /// Gives every global, static and program its place and its initial bytes.
     pub(crate) fn lay_out(&mut self) {
+        self.lay_out_areas();
         let mut order: Vec<usize> = (0..self.globals.len()).collect();
         let list = |i: &usize| self.globals[*i].list.map(|l| (self.lists[l].slot, key(&self.lists[l].name)));
         order.sort_by_key(list);
@@ -43,38 +44,45 @@ impl<'a> Compiler<'a> {
     fn lay_out_global(&mut self, i: usize) {
         let Some(var) = self.globals[i].var.clone() else { return };
         self.home = self.globals[i].home;
-        if let Some(at) = &var.decl.at {
-            self.report(Code::NotSupported, at.span, "direct addresses are not supported yet").help =
-                Some("wire the variable to a channel in the [io] section of takt.toml".into());
+        if self.fill_fixed(&var, None) {
+            return;
         }
         let (size, align) = self.types.layout(var.ty);
         let offset = self.take(size, align.max(if size >= 16 { 16 } else { 1 }), var.span);
         if let Some(v) = &mut self.globals[i].var {
             v.storage = Storage::Image(offset);
         }
-        let name = match self.globals[i].list {
-            Some(list) => format!("{}.{}", self.lists[list].name, var.name),
-            None => var.name.clone(),
-        };
-        let bare = self.globals[i].list.is_none_or(|l| !self.lists[l].qualified_only)
-            && matches!(self.names.get(&self.entered(&var.name)), Some(crate::scope::Item::Global(n)) if *n == i);
-        self.program.globals.push(Global {
-            name,
-            bare,
-            ty: var.ty,
-            offset,
-            constant: var.constant,
-            doc: var.decl.doc.clone().unwrap_or_default(),
-        });
+        self.push_global(i, var.ty, offset);
         self.fill_variable(&var, offset, None);
         self.note_instances(var.ty, offset);
     }
 
-    fn fill_variable(&mut self, var: &crate::scope::Variable<'a>, offset: u32, pou: Option<usize>) {
+    /// The name of a global with that of its list.
+    pub(crate) fn global_path(&self, i: usize) -> String {
+        let name = &self.globals[i].decl.name.text;
+        match self.globals[i].list {
+            Some(list) => format!("{}.{name}", self.lists[list].name),
+            None => name.clone(),
+        }
+    }
+
+    /// Makes a global known by its name.
+    pub(crate) fn push_global(&mut self, i: usize, ty: TypeId, offset: u32) {
+        let Some(var) = self.globals[i].var.clone() else { return };
+        let name = self.global_path(i);
+        let bare = self.globals[i].list.is_none_or(|l| !self.lists[l].qualified_only)
+            && matches!(self.names.get(&self.entered(&var.name)), Some(crate::scope::Item::Global(n)) if *n == i);
+        self.program.globals.push(Global { name, bare, ty, offset, constant: var.constant, doc: var.decl.doc.clone().unwrap_or_default() });
+    }
+
+    pub(crate) fn fill_variable(&mut self, var: &crate::scope::Variable<'a>, offset: u32, pou: Option<usize>) {
         let size = self.types.size(var.ty) as usize;
         let mut bytes = vec![0; size];
         let mut late = Vec::new();
         self.fill(var.decl, var.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
+        if let (Type::Bit(_), Some(byte)) = (self.types.get(var.ty), self.program.init.get(offset as usize)) {
+            bytes[0] |= byte;
+        }
         self.write(offset, &bytes);
         let home = self.home;
         self.late.extend(late.into_iter().map(|late| (pou, home, Late { offset: offset + late.offset, ..late })));
@@ -94,7 +102,7 @@ impl<'a> Compiler<'a> {
         self.home = self.pous[i].home;
         for v in 0..self.pous[i].vars.len() {
             let var = self.pous[i].vars[v].clone();
-            if var.kind != VarKind::Stat || var.value.is_some() {
+            if self.fill_fixed(&var, Some(i)) || var.kind != VarKind::Stat || var.value.is_some() {
                 continue;
             }
             let (size, align) = self.types.layout(var.ty);

@@ -176,7 +176,16 @@ impl<'a> Compiler<'a> {
             target.late.push(Late { offset: at, ty, what: What::Expr(expr) });
             return true;
         }
-        match self.known(expr, target.pou, Some(ty)).0 {
+        let bit = match *self.types.get(ty) {
+            Type::Bit(bit) => Some(bit),
+            _ => None,
+        };
+        let wanted = if bit.is_some() { self.elem(takt_abi::Elem::Bool) } else { ty };
+        match self.known(expr, target.pou, Some(wanted)).0 {
+            Known::Value(value) if let Some(bit) = bit => {
+                let byte = &mut target.bytes[at as usize];
+                *byte = *byte & !(1 << bit) | u8::from(value.word() != 0) << bit;
+            }
             Known::Value(value) => self.store_value(&value, ty, &mut target.bytes[at as usize..]),
             Known::Dynamic => target.late.push(Late { offset: at, ty, what: What::Expr(expr) }),
             Known::Error => return false,

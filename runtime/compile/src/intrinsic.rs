@@ -98,6 +98,7 @@ impl<'a> Lowering<'_, 'a> {
     pub(crate) fn intrinsic(&mut self, name: &str, at: Span, args: &'a [Arg], span: Span) -> Operand {
         let upper = key(name);
         match upper.as_str() {
+            "BITADR" => return self.bit_address(args, span),
             "ADR" | "REF" => return self.adr(args, span),
             "SIZEOF" | "XSIZEOF" => return self.size_of(args, span),
             "LOWER_BOUND" | "UPPER_BOUND" => return self.bound(&upper, args, span),

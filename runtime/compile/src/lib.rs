@@ -7,6 +7,7 @@
 //! **The compiler knows no block by name.** It is handed libraries; what it knows itself are the operators and the overloaded functions of
 //! IEC 61131-3 (`ABS`, `LIMIT`, `INT_TO_REAL`, …).
 
+mod address;
 mod any;
 mod body;
 mod call;
@@ -65,6 +66,10 @@ pub struct Options {
     pub lint: bool,
     /// Bytes of the heap of `__NEW` (rounded up to a power of two); 0 means 1 MiB. A program that does not use it has none.
     pub heap: u32,
+    /// Numbers of direct addresses count in bytes (`%IW3` is bytes 3 and 4) rather than in units of their own width.
+    pub byte_addresses: bool,
+    /// What the project wires to its bus: direct addresses, which then exist, and paths of variables, which then need no other address.
+    pub wired: Vec<String>,
     /// BOOL expressions in global scope (`--until`, conditions of the manifest). Their [`FileId`]s follow those of the sources.
     pub conditions: Vec<Source>,
     /// What `{IF defined(NAME)}` and `hasvalue(NAME, 'text')` ask for, with values that may be empty.

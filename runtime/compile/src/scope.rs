@@ -17,6 +17,8 @@ pub(crate) fn key(name: &str) -> String {
 pub(crate) enum Storage {
     /// At a fixed offset of the image.
     Image(u32),
+    /// A bit of a byte at a fixed offset of the image.
+    Bit(u32, u8),
     /// In the instance that the body runs on.
     This(u32),
     /// In the body's frame.

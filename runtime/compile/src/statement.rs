@@ -311,7 +311,8 @@ impl<'a> Lowering<'_, 'a> {
             _ => self.expr(e),
         };
         if !value.is_error() {
-            self.assign_place(&Place::Memory { base, offset }, ty, value, e.span);
+            let (place, ty) = self.bit_place(Place::Memory { base, offset }, ty);
+            self.assign_place(&place, ty, value, e.span);
         }
         self.b.release(mark);
     }

@@ -1,7 +1,7 @@
 //! Tasks: from CONFIGURATION, or the one that is meant without it.
 
 use crate::constant::Value;
-use crate::expression::Lowering;
+use crate::expression::{Kind, Lowering};
 use crate::initial::Known;
 use crate::place::Place;
 use crate::scope::{Item, PouKind, key};
@@ -185,12 +185,11 @@ impl<'a> Compiler<'a> {
         let operand = scratch.expr(value);
         let bool_type = scratch.bool_type();
         match operand.kind {
-            crate::expression::Kind::Place(crate::place::Place::Memory { base: takt_ir::Base::Image, offset })
-                if operand.ty == bool_type =>
-            {
-                Some(Trigger::Event(offset))
+            Kind::Place(Place::Memory { base: Base::Image, offset }) if operand.ty == bool_type => Some(Trigger::Event(offset, None)),
+            Kind::Place(Place::Bits { whole, shift, width: 1, .. }) if let Place::Memory { base: Base::Image, offset } = *whole => {
+                Some(Trigger::Event(offset + shift / 8, Some((shift % 8) as u8)))
             }
-            crate::expression::Kind::Error => None,
+            Kind::Error => None,
             _ => {
                 self.report(Code::BadTask, value.span, "SINGLE needs a global BOOL variable");
                 None
@@ -205,7 +204,13 @@ impl<'a> Compiler<'a> {
         for (program, connections) in programs {
             let ty = lowering.c.pou_type(*program);
             let offset = lowering.c.pous[*program].instance.max(takt_ir::NULL_ZONE);
-            let at = lowering.c.pous[*program].tree.name.span;
+            let tree = lowering.c.pous[*program].tree;
+            let at = tree.name.span;
+            if connections.is_empty() && tree.vars.iter().any(|v| v.kind == tree::VarKind::InOut && !v.vars.is_empty()) {
+                lowering.report(Code::BadTask, at, "a PROGRAM that a task calls has no VAR_IN_OUT").help =
+                    Some("connect it in the CONFIGURATION: `PROGRAM p WITH task : name(x := GVL.x);`".into());
+                continue;
+            }
             let instance = lowering.at(Place::Memory { base: Base::Image, offset }, ty, at);
             lowering.call_instance(instance, connections, span);
         }

@@ -49,6 +49,9 @@ impl<'a> Compiler<'a> {
                 self.types.intern(Type::WString(n))
             }
             TypeExprKind::Array { dims, elem } => self.array_type(dims, elem, pou, t.span),
+            TypeExprKind::Pointer(to) | TypeExprKind::RefTo(to) | TypeExprKind::Reference(to) if is_bit(to) => {
+                self.no_bits(to.span, "a POINTER or REFERENCE leads to no BIT", "BOOL")
+            }
             TypeExprKind::Pointer(to) | TypeExprKind::RefTo(to) => {
                 let to = self.type_expr(to, pou, false);
                 self.types.intern(Type::Pointer(to))
@@ -86,6 +89,11 @@ impl<'a> Compiler<'a> {
         }
     }
 
+    fn no_bits(&mut self, span: Span, message: &str, instead: &str) -> TypeId {
+        self.report(Code::TypeMismatch, span, message).help = Some(format!("use {instead}"));
+        self.error_type()
+    }
+
     fn string_length(&mut self, n: Option<&'a tree::Expr>, pou: Option<usize>) -> u32 {
         let Some(expr) = n else { return 80 };
         match self.constant_int(expr, pou) {
@@ -99,6 +107,9 @@ impl<'a> Compiler<'a> {
     }
 
     fn array_type(&mut self, dims: &'a [Option<(tree::Expr, tree::Expr)>], elem: &'a TypeExpr, pou: Option<usize>, span: Span) -> TypeId {
+        if is_bit(elem) {
+            return self.no_bits(elem.span, "an ARRAY has no elements of type BIT", "BOOL, or BYTE and its bits");
+        }
         let elem = self.type_expr(elem, pou, true);
         if dims.iter().any(Option::is_none) {
             return self.types.intern(Type::OpenArray { elem, dims: dims.len() as u32 });
@@ -347,15 +358,25 @@ impl<'a> Compiler<'a> {
     ) -> TypeId {
         let (mut layout, mut fields) = self.inherited(base);
         for decl in decls {
-            let ty = self.variable_type(decl, None);
+            let declared = self.variable_type(decl, None);
+            self.note_address(decl, declared, false, crate::address::Section::Structure(id));
             if fields.iter().any(|f| key(&f.name) == key(&decl.name.text)) {
                 let first = decls.iter().find(|d| key(&d.name.text) == key(&decl.name.text) && d.name.span != decl.name.span);
                 self.declared_twice(&decl.name, Some(name), first.map(|d| d.name.span));
             }
-            let (size, align) = self.types.layout(ty);
+            let packed = is_bit(&decl.ty) && decl.at.is_none();
+            let (size, align) = self.types.layout(declared);
             // Instances of classes are found at multiples of their granule only.
             let align = pack.filter(|_| u64::from(align) < takt_abi::GRANULE).map_or(align, |pack| align.min(pack));
-            let offset = if kind == StructKind::Union { layout.overlay(size, align) } else { layout.add(size, align) };
+            let (offset, ty) = match kind {
+                StructKind::Union if packed => (layout.overlay(1, 1), self.types.intern(Type::Bit(0))),
+                StructKind::Union => (layout.overlay(size, align), declared),
+                _ if packed => {
+                    let (offset, bit) = layout.add_bit();
+                    (offset, self.types.intern(Type::Bit(bit)))
+                }
+                _ => (layout.add(size, align), declared),
+            };
             fields.push(Field {
                 name: decl.name.text.clone(),
                 ty,
@@ -385,7 +406,7 @@ impl<'a> Compiler<'a> {
     /// Members and room that a type has from the one it extends.
     fn inherited(&self, base: Option<TypeId>) -> (Layout, Vec<Field>) {
         match base.map(|base| self.types.get(base)) {
-            Some(Type::Struct(s)) => (Layout { size: s.size.into(), align: s.align }, s.fields.clone()),
+            Some(Type::Struct(s)) => (Layout { size: s.size.into(), align: s.align, bits: 0 }, s.fields.clone()),
             _ => Default::default(),
         }
     }
@@ -488,9 +509,8 @@ impl<'a> Compiler<'a> {
         }
         let ty =
             if block.kind == VarKind::InOut { self.type_expr(&decl.ty, Some(index), true) } else { self.variable_type(decl, Some(index)) };
-        if let Some(at) = &decl.at {
-            self.report(Code::NotSupported, at.span, "a direct address is only supported in VAR_GLOBAL");
-        }
+        let instance = matches!(self.pous[index].tree.kind, PouKind::FunctionBlock | PouKind::Program).then(|| self.pou_type(index));
+        self.note_address(decl, ty, block.constant, crate::address::Section::Unit(block.kind, instance));
         let value = if block.constant && decl.init.is_some() { self.constant_of(decl, ty, Some(index)) } else { None };
         let position = self.pous[index].vars.len();
         let storage = match (block.kind, self.owner_of(index)) {
@@ -524,7 +544,7 @@ impl<'a> Compiler<'a> {
         let mut filled = Vec::new();
         for i in 0..self.pous[index].vars.len() {
             let v = self.pous[index].vars[i].clone();
-            if matches!(v.kind, VarKind::Temp | VarKind::Stat) || v.value.is_some() {
+            if matches!(v.kind, VarKind::Temp | VarKind::Stat) || v.value.is_some() || self.fixed_address(v.decl).is_some() {
                 continue;
             }
             let (size, align) = match (v.kind, self.types.get(v.ty)) {
@@ -611,6 +631,7 @@ impl<'a> Compiler<'a> {
         self.inside.push((&decl.name, decl.name.span));
         let ty = self.variable_type(decl, None);
         let constant = self.globals[index].constant;
+        self.note_address(decl, ty, constant, crate::address::Section::Global(index));
         let value = if constant && decl.init.is_some() { self.constant_of(decl, ty, None) } else { None };
         self.inside.pop();
         self.home = home;
@@ -670,14 +691,26 @@ fn distance(a: &str, b: &str, limit: usize) -> Option<usize> {
 struct Layout {
     size: u64,
     align: u32,
+    /// Bits that are free in the last byte.
+    bits: u8,
 }
 
 impl Layout {
     fn add(&mut self, size: u32, align: u32) -> u32 {
+        self.bits = 0;
         self.align = self.align.max(align);
         let at = self.size.next_multiple_of(align.max(1).into());
         self.size = at + u64::from(size);
         at.min(u32::MAX.into()) as u32
+    }
+    /// The next bit: consecutive ones share bytes.
+    fn add_bit(&mut self) -> (u32, u8) {
+        if self.bits == 0 {
+            self.add(1, 1);
+            self.bits = 8;
+        }
+        self.bits -= 1;
+        ((self.size - 1).min(u32::MAX.into()) as u32, 7 - self.bits)
     }
     /// As [`Layout::add`], but not at the start if a class must not begin there.
     fn add_behind(&mut self, size: u32, align: u32, class: bool) -> u32 {
@@ -703,6 +736,11 @@ fn kept_key(method: &str, name: &str) -> String {
     key(&format!("{method}.{name}"))
 }
 
+/// Whether BIT is written.
+fn is_bit(ty: &TypeExpr) -> bool {
+    matches!(&ty.kind, TypeExprKind::Named(parts) if matches!(&parts[..], [name] if name.text.eq_ignore_ascii_case("BIT")))
+}
+
 pub(crate) fn is_integer(e: Elem) -> bool {
     use Elem::*;
     matches!(e, Byte | Word | Dword | Lword | Sint | Int | Dint | Lint | Usint | Uint | Udint | Ulint)
@@ -710,6 +748,7 @@ pub(crate) fn is_integer(e: Elem) -> bool {
 
 const ELEMENTARY: &[(&str, Elem)] = &[
     ("BOOL", Elem::Bool),
+    ("BIT", Elem::Bool),
     ("BYTE", Elem::Byte),
     ("WORD", Elem::Word),
     ("DWORD", Elem::Dword),

@@ -30,6 +30,7 @@ pub(crate) struct Compiler<'a> {
     pub(crate) names: HashMap<String, Item>,
     /// Libraries' names.
     pub(crate) library_names: HashMap<String, Item>,
+    pub(crate) addresses: crate::address::Addresses<'a>,
     /// Where a user's name was declared, for messages.
     pub(crate) declared_at: HashMap<String, Span>,
     pub(crate) pous: Vec<Pou<'a>>,
@@ -92,6 +93,7 @@ impl<'a> Compiler<'a> {
             types: Types::default(),
             names: HashMap::new(),
             library_names: HashMap::new(),
+            addresses: Default::default(),
             declared_at: HashMap::new(),
             pous: Vec::new(),
             declared: Vec::new(),
@@ -147,6 +149,7 @@ impl<'a> Compiler<'a> {
         let mut program = std::mem::take(&mut self.program);
         program.sites = std::mem::take(&mut self.sites.all);
         program.types = std::mem::take(&mut self.types);
+        self.map(&mut program);
         (program, conditions)
     }
 

@@ -28,13 +28,8 @@ fn refuse(found: &mut Vec<Diagnostic>, span: Span, message: &str) {
 }
 
 fn section(block: &VarBlock, found: &mut Vec<Diagnostic>) {
-    match block.kind {
-        VarKind::Generic => refuse(found, block.span, "VAR_GENERIC is not supported yet"),
-        VarKind::Config => {
-            let diagnostic = Diagnostic::new(Code::NoEffect, block.span, "`VAR_CONFIG` has no effect yet: its addresses are not wired");
-            found.push(diagnostic.help("declare the variables with their addresses: `lamp AT %QX0.0 : BOOL;`"));
-        }
-        _ => {}
+    if block.kind == VarKind::Generic {
+        refuse(found, block.span, "VAR_GENERIC is not supported yet");
     }
 }
 

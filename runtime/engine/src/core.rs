@@ -8,6 +8,7 @@ use crate::bus::{IoDriver, IoFault, ProcessImage};
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::load::Link;
+use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned, execute};
 use crate::options::{Clock, Preemption};
 use crate::schedule::TaskState;
@@ -28,6 +29,8 @@ const RECORDED: usize = 1 << 16;
 /// A value that a variable is held at.
 pub(crate) struct Force {
     pub place: Place,
+    /// Bits of the first byte that are held.
+    pub mask: u8,
     pub bytes: Vec<u8>,
 }
 
@@ -43,6 +46,8 @@ pub(crate) struct Core {
     pub bus: usize,
     pub stage: Stage,
     pub links: Vec<Link>,
+    /// Variables with addresses from VAR_CONFIG.
+    pub mappings: Vec<Mapping>,
     pub io: ProcessImage,
     pub driver: Box<dyn IoDriver>,
     pub io_fault: Option<IoFault>,
@@ -68,6 +73,15 @@ pub(crate) struct Core {
     pub inner_ns: u64,
     pub inner_time: Time,
     pub scan_started: Time,
+}
+
+/// Writes a value; of its first byte only the bits of `mask`.
+pub(crate) fn put(target: &mut [u8], bytes: &[u8], mask: u8) {
+    let first = target.first().map_or(0, |byte| byte & !mask);
+    target.copy_from_slice(bytes);
+    if let Some(byte) = target.first_mut() {
+        *byte = *byte & mask | first;
+    }
 }
 
 impl Core {
@@ -144,8 +158,14 @@ impl Core {
             self.env.get_mut().host.latch(wait);
         }
         self.apply_forces();
+        if index == self.bus {
+            self.map(Mapping::latch);
+        }
         self.run(index, now);
         self.apply_forces();
+        if index == self.bus {
+            self.map(Mapping::publish);
+        }
         if index == self.bus {
             self.bus_outputs(now);
         }
@@ -344,13 +364,23 @@ impl Core {
         self.stage.bus_answered(self.io_fault.is_none());
     }
 
+    /// Copies between variables and their addresses, against which forces hold too.
+    fn map(&mut self, copy: fn(&mut Mapping, &mut [u8])) {
+        if self.mappings.is_empty() {
+            return;
+        }
+        let image = self.image.bytes_mut();
+        self.mappings.iter_mut().for_each(|mapping| copy(mapping, image));
+        self.apply_forces();
+    }
+
     /// Holds forced variables at their values.
     pub fn apply_forces(&mut self) {
         let image = self.image.bytes_mut();
         for force in &self.forces {
             let start = force.place.offset as usize;
             if let Some(target) = image.get_mut(start..start + force.bytes.len()) {
-                target.copy_from_slice(&force.bytes);
+                put(target, &force.bytes, force.mask);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::axis::stage::AxisStatus;
 use crate::bus::{IoFault, ProcessImage};
-use crate::core::{Core, Force};
+use crate::core::{Core, Force, put};
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::memory::execute;
@@ -11,7 +11,7 @@ use crate::statistics::TaskStatistics;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_abi::{Fault, Time};
-use takt_ir::{Base, BodyId, Inst, Place, Program};
+use takt_ir::{Base, BodyId, Inst, Place, Program, Type};
 
 /// Fuel of a condition.
 const CONDITION_FUEL: i64 = 100_000;
@@ -208,19 +208,28 @@ impl Engine {
         if end > self.image().len() { Err(AccessError::Outside) } else { Ok(start..end) }
     }
 
-    /// The bytes of a variable (see [`takt_ir::resolve`]); empty if the place is not of this program.
+    /// The bytes of a variable (see [`takt_ir::resolve`]), of a bit the byte around it; empty if the place is not of this program.
     pub fn read(&self, place: Place) -> &[u8] {
         self.range(place).map_or(&[], |range| &self.image()[range])
     }
 
-    /// Writes a variable once.
+    /// Writes a variable once; of a bit, the byte around it with that bit is given.
     pub fn write(&mut self, place: Place, bytes: &[u8]) -> Result<(), AccessError> {
         let range = self.range(place)?;
         if range.len() != bytes.len() {
             return Err(AccessError::Size { expected: range.len(), found: bytes.len() });
         }
-        self.core.image.bytes_mut()[range].copy_from_slice(bytes);
+        let mask = self.mask(place);
+        put(&mut self.core.image.bytes_mut()[range], bytes, mask);
         Ok(())
+    }
+
+    /// The bits of a variable's first byte.
+    fn mask(&self, place: Place) -> u8 {
+        match self.core.program.types.get(place.ty) {
+            Type::Bit(bit) => 1u8.checked_shl((*bit).into()).unwrap_or(0),
+            _ => u8::MAX,
+        }
     }
 
     /// Holds a variable at a value: written before and after the programs of each scan, until [`Engine::unforce`].
@@ -228,7 +237,10 @@ impl Engine {
         self.write(place, bytes)?;
         match self.core.forces.iter_mut().find(|f| f.place == place) {
             Some(force) => force.bytes.copy_from_slice(bytes),
-            None => self.core.forces.push(Force { place, bytes: bytes.to_vec() }),
+            None => {
+                let mask = self.mask(place);
+                self.core.forces.push(Force { place, mask, bytes: bytes.to_vec() });
+            }
         }
         Ok(())
     }

@@ -18,6 +18,7 @@ mod engine;
 mod executor;
 mod fault;
 mod load;
+mod mapping;
 mod memory;
 mod options;
 mod schedule;

@@ -7,6 +7,7 @@ use crate::core::Core;
 use crate::engine::Engine;
 use crate::executor::Executor;
 use crate::fault::FaultRecord;
+use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned};
 use crate::options::{Clock, ExecutorKind, Options};
 use crate::schedule::{TaskState, default_bus_task};
@@ -161,6 +162,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         bus,
         stage: Stage::new(options.axes, period.seconds()),
         links,
+        mappings: program.mapped.iter().map(|mapped| Mapping::new(&program, *mapped)).collect(),
         io: ProcessImage::new(driver.size()),
         driver,
         io_fault: None,
@@ -225,11 +227,7 @@ fn links(program: &Program, wires: &[Wire], driver: &dyn IoDriver) -> Result<Vec
         let fail = |problem| LoadError::Wire { name: wire.name.clone(), problem };
         links.push(Link::new(program, wire, driver).map_err(fail)?);
         let collides = |other: &&Wire| {
-            if wire.channel.is_input() {
-                other.channel.is_input() && other.place.offset == wire.place.offset
-            } else {
-                other.channel == wire.channel
-            }
+            if wire.channel.is_input() { other.channel.is_input() && other.place == wire.place } else { other.channel == wire.channel }
         };
         if let Some(other) = wires[..i].iter().find(collides) {
             return Err(fail(WireProblem::Twice { with: other.name.clone() }));
@@ -242,6 +240,8 @@ fn links(program: &Program, wires: &[Wire], driver: &dyn IoDriver) -> Result<Vec
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Bool,
+    /// A bit of a byte.
+    Bit(u8),
     Real,
     Lreal,
 }
@@ -270,6 +270,7 @@ impl Link {
         let digital = matches!(wire.channel, Channel::BitIn(_) | Channel::BitOut(_));
         let kind = match program.types.all().get(wire.place.ty.0 as usize) {
             Some(Type::Elem(Elem::Bool)) if digital => Kind::Bool,
+            Some(Type::Bit(bit)) if digital => Kind::Bit(*bit),
             Some(Type::Elem(Elem::Real)) if !digital => Kind::Real,
             Some(Type::Elem(Elem::Lreal)) if !digital => Kind::Lreal,
             other => {
@@ -278,7 +279,7 @@ impl Link {
             }
         };
         let bytes = match kind {
-            Kind::Bool => 1,
+            Kind::Bool | Kind::Bit(_) => 1,
             Kind::Real => 4,
             Kind::Lreal => 8,
         };
@@ -298,6 +299,7 @@ impl Link {
     pub fn latch(&self, image: &mut [u8], io: &ProcessImage) {
         let place = &mut image[self.offset..];
         match (self.channel, self.kind) {
+            (Channel::BitIn(i), Kind::Bit(bit)) => place[0] = place[0] & !(1 << bit) | u8::from(io.bits_in[i] != 0) << bit,
             (Channel::BitIn(i), _) => place[0] = u8::from(io.bits_in[i] != 0),
             (Channel::AnalogIn(i), Kind::Real) => (io.analog_in[i] as f32).store(place),
             (Channel::AnalogIn(i), _) => io.analog_in[i].store(place),
@@ -309,7 +311,10 @@ impl Link {
     pub fn publish(&self, image: &[u8], io: &mut ProcessImage, faulted: bool) {
         let place = &image[self.offset..];
         match (self.channel, self.kind) {
-            (Channel::BitOut(i), _) => io.bits_out[i] = if faulted { u8::from(self.safe != 0.0) } else { u8::from(place[0] != 0) },
+            (Channel::BitOut(i), kind) => {
+                let mask = if let Kind::Bit(bit) = kind { 1 << bit } else { u8::MAX };
+                io.bits_out[i] = u8::from(if faulted { self.safe != 0.0 } else { place[0] & mask != 0 });
+            }
             (Channel::AnalogOut(i), kind) => {
                 let value = if kind == Kind::Real { f64::from(f32::load(place)) } else { f64::load(place) };
                 io.analog_out[i] = if faulted || !value.is_finite() { self.safe } else { value };

@@ -42,7 +42,7 @@ impl TaskState {
         let task = &program.tasks[index];
         let period = match task.trigger {
             Trigger::Cyclic(ns) => Time(ns.max(1)),
-            Trigger::Event(_) | Trigger::Freewheeling => IDLE_PERIOD,
+            Trigger::Event(..) | Trigger::Freewheeling => IDLE_PERIOD,
         };
         Self {
             trigger: task.trigger,
@@ -62,7 +62,7 @@ impl TaskState {
         }
     }
     fn is_event(&self) -> bool {
-        matches!(self.trigger, Trigger::Event(_))
+        matches!(self.trigger, Trigger::Event(..))
     }
     pub fn due(&self, now: Time) -> bool {
         !self.running && if self.is_event() { self.pending } else { self.release <= now }
@@ -85,8 +85,9 @@ impl TaskState {
     }
     /// Looks at an event task's variable.
     pub fn watch(&mut self, image: &[u8], now: Time) {
-        if let Trigger::Event(offset) = self.trigger {
-            let level = image.get(offset as usize).is_some_and(|b| *b != 0);
+        if let Trigger::Event(offset, bit) = self.trigger {
+            let mask = bit.map_or(u8::MAX, |bit| 1 << bit);
+            let level = image.get(offset as usize).is_some_and(|b| b & mask != 0);
             if level && !self.level {
                 (self.pending, self.release) = (true, now);
             }

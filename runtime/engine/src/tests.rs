@@ -453,3 +453,5 @@ fn a_fault_in_the_initial_values_is_told_at_loading() {
     let error = load(program(&text), Options::default(), Box::new(NoBus)).unwrap_err();
     assert!(matches!(&error, LoadError::Initial(r) if r.fault == Fault::DivisionByZero && r.task.is_empty()), "{error}");
 }
+
+mod addresses;

@@ -4,6 +4,7 @@
 //! has accepted it. **Invariant:** a verified body reaches memory only through an address whose extent is known, so that no program can touch
 //! anything but its own image.
 
+mod address;
 mod calendar;
 mod calls;
 pub mod heap;
@@ -23,6 +24,7 @@ mod types;
 mod value;
 mod verify;
 
+pub use address::{Address, AddressError, Area, Areas, LARGEST_AREA, Mapped, parse_address, placeholder};
 pub use calls::{CallGraph, Components};
 pub use inst::{Base, Block, BlockId, Body, BodyId, Const, Inst, Local, Mem, NativeId, SiteId, Term, Ty};
 pub use interp::{Interpreter, run_body};

@@ -79,11 +79,15 @@ impl std::fmt::Display for ValueError {
 }
 impl std::error::Error for ValueError {}
 
-/// The bytes of a literal of the type (as many as the type has), range-checked: elementary types, subranges, strings, enumerations by member or number.
+/// The bytes of a literal of the type (as many as the type has; of a bit the byte around it with that bit), range-checked: elementary types, subranges, strings, enumerations by member or number.
 pub fn parse_value(types: &Types, ty: TypeId, text: &str) -> Result<Vec<u8>, ValueError> {
     let name = types.name(ty);
     match types.get(ty) {
         Type::Elem(elem) => Literal { text, ty: &name }.elem(*elem, range(*elem)),
+        Type::Bit(bit) => {
+            let value = Literal { text, ty: "BOOL" }.elem(Elem::Bool, (0, 1))?;
+            Ok(vec![value[0].checked_shl((*bit).into()).unwrap_or(0)])
+        }
         Type::Subrange { base, low, high } => Literal { text, ty: &name }.elem(*base, (*low, *high)),
         Type::Enum(e) => Literal { text, ty: &name }.member(e),
         Type::String(cap) => Literal { text, ty: &name }.string(*cap),

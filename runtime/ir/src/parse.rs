@@ -3,6 +3,7 @@
 //! What is read need not be a valid program: that is [`crate::verify`]'s to say. For test cases that are written by hand, sites may be left out (`@0` is
 //! meant), and without any `site` and `file` a table is made: site *n* is line *n* of a file `ir`.
 
+use crate::address::{Area, Mapped};
 use crate::inst::{BodyId, Inst, SiteId, Term};
 use crate::program::{Class, Dispatch, Family, Global, Instances, Native, Program, Site, Task, Trigger};
 use crate::types::TypeId;
@@ -68,6 +69,8 @@ fn item(cursor: &mut Cursor<'_>, program: &mut Program, natives: &dyn Fn(&str) -
             }
         }
         "global" => program.globals.push(global(cursor)?),
+        "area" => area(cursor, program)?,
+        "mapped" => program.mapped.push(mapped(cursor)?),
         "task" => program.tasks.push(task(cursor)?),
         "class" => {
             let name = cursor.text()?;
@@ -122,6 +125,35 @@ fn global(cursor: &mut Cursor<'_>) -> Result<Global, ParseError> {
     Ok(Global { name, bare, ty, offset, constant, doc: cursor.doc()? })
 }
 
+/// The letter of an area.
+fn letter(cursor: &mut Cursor<'_>) -> Result<Area, ParseError> {
+    let word = cursor.word()?;
+    let found = Area::ALL.into_iter().find(|area| area.letter().to_string() == word);
+    found.ok_or_else(|| cursor.wrong_last(&format!("expected `I`, `Q` or `M`, found `{word}`")))
+}
+
+fn area(cursor: &mut Cursor<'_>, program: &mut Program) -> Result<(), ParseError> {
+    let area = letter(cursor)?;
+    program.areas.word |= cursor.accept("word");
+    cursor.expect("at")?;
+    let start = cursor.number()?;
+    cursor.expect("size")?;
+    program.areas.ranges[area as usize] = (start, cursor.number()?);
+    Ok(())
+}
+
+fn mapped(cursor: &mut Cursor<'_>) -> Result<Mapped, ParseError> {
+    let area = letter(cursor)?;
+    cursor.expect("type")?;
+    let ty = TypeId(cursor.number()?);
+    cursor.expect("at")?;
+    let offset = cursor.number()?;
+    cursor.expect("to")?;
+    let address = cursor.number()?;
+    let bit = if cursor.accept("bit") { Some(cursor.number()?) } else { None };
+    Ok(Mapped { area, ty, offset, address, bit })
+}
+
 /// `from 1 [`.
 fn from(cursor: &mut Cursor<'_>) -> Result<u32, ParseError> {
     cursor.expect("from")?;
@@ -144,7 +176,10 @@ fn task(cursor: &mut Cursor<'_>) -> Result<Task, ParseError> {
     let name = cursor.text()?;
     let trigger = match cursor.word()? {
         "cyclic" => Trigger::Cyclic(cursor.number()?),
-        "event" => Trigger::Event(cursor.number()?),
+        "event" => {
+            let offset = cursor.number()?;
+            Trigger::Event(offset, if cursor.accept("bit") { Some(cursor.number()?) } else { None })
+        }
         "freewheeling" => Trigger::Freewheeling,
         other => return Err(cursor.wrong_last(&format!("expected `cyclic`, `event` or `freewheeling`, found `{other}`"))),
     };
@@ -201,6 +236,7 @@ mod tests {
         assert_eq!(print_program(&second), text);
         assert_eq!((&first.bodies, &first.sites, &first.files, &first.data), (&second.bodies, &second.sites, &second.files, &second.data));
         assert_eq!((&first.init, &first.tasks, &first.globals), (&second.init, &second.tasks, &second.globals));
+        assert_eq!((first.areas, &first.mapped), (second.areas, &second.mapped));
         assert_eq!(first.types, second.types);
         assert_eq!((first.init_body, first.image_size), (second.init_body, second.image_size));
     }

@@ -16,6 +16,8 @@
 //! heap 128 64
 //! type INT                             ; numbered from 0
 //! global "GVL.x" type 0 at 16 bare
+//! area Q word at 32 size 2             ; direct addresses, counted in units
+//! mapped Q type 1 at 16 to 32 bit 3    ; VAR_CONFIG: the variable, its address
 //! task "Main" cyclic 1000000 priority 0 entry 0 stack 128 64
 //! start 0                              ; runs before the first scan
 //! body "PLC_PRG" (i64, addr:8) -> i64 frame 32 recursive @0
@@ -48,6 +50,7 @@
 //!   return v2                          ; or: rethrow v2
 //! ```
 
+use crate::address::{Area, Areas, Mapped};
 use crate::inst::{Base, Body, Const, Inst, Local, Mem, Term, Ty};
 use crate::program::{Program, Trigger};
 use std::fmt::{self, Write};
@@ -102,11 +105,13 @@ impl Printer<'_> {
             out.push_str(if global.constant { " constant" } else { "" });
             writeln!(out, "{}", Doc(&global.doc))?;
         }
+        self.addresses(out)?;
         for task in &program.tasks {
             write!(out, "task {} ", Quoted(&task.name))?;
             match task.trigger {
                 Trigger::Cyclic(period) => write!(out, "cyclic {period}")?,
-                Trigger::Event(offset) => write!(out, "event {offset}")?,
+                Trigger::Event(offset, None) => write!(out, "event {offset}")?,
+                Trigger::Event(offset, Some(bit)) => write!(out, "event {offset} bit {bit}")?,
                 Trigger::Freewheeling => write!(out, "freewheeling")?,
             }
             writeln!(out, " priority {} entry {} stack {} {}", task.priority, task.entry.0, task.stack.0, task.stack.1)?;
@@ -139,6 +144,19 @@ impl Printer<'_> {
         }
         if program.heap != (0, 0) {
             writeln!(out, "heap {} {}", program.heap.0, program.heap.1)?;
+        }
+        Ok(())
+    }
+
+    fn addresses(&self, out: &mut String) -> fmt::Result {
+        let Areas { word, ranges } = self.program.areas;
+        for (area, (start, len)) in Area::ALL.into_iter().zip(ranges).filter(|(_, (_, len))| *len > 0) {
+            writeln!(out, "area {}{} at {start} size {len}", area.letter(), if word { " word" } else { "" })?;
+        }
+        for Mapped { area, ty, offset, address, bit } in &self.program.mapped {
+            write!(out, "mapped {} type {} at {offset} to {address}", area.letter(), ty.0)?;
+            bit.map_or(Ok(()), |bit| write!(out, " bit {bit}"))?;
+            out.push('\n');
         }
         Ok(())
     }

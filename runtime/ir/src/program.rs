@@ -1,5 +1,6 @@
 //! A complete program.
 
+use crate::address::{Areas, Mapped};
 use crate::inst::{Body, BodyId, Ty};
 use crate::types::{TypeId, Types};
 use takt_abi::{Classes, GRANULE, Heap, NativeFn};
@@ -34,8 +35,8 @@ pub struct Site {
 pub enum Trigger {
     /// Every so many nanoseconds.
     Cyclic(i64),
-    /// Rising edge of the BOOL at this offset.
-    Event(u32),
+    /// Rising edge of the BOOL at this offset, or of a bit of the byte there.
+    Event(u32, Option<u8>),
     /// As often as possible.
     Freewheeling,
 }
@@ -176,6 +177,10 @@ pub struct Program {
     pub dispatch: Vec<Dispatch>,
     /// Types that are asked for at run time.
     pub families: Vec<Family>,
+    /// Where what is addressed directly lies.
+    pub areas: Areas,
+    /// Variables that VAR_CONFIG gives addresses.
+    pub mapped: Vec<Mapped>,
     /// The heap of `__NEW`: first byte and bytes (16 · 2ⁿ, or 0).
     pub heap: (u32, u32),
 }

@@ -3,6 +3,7 @@
 //! A path starts at a global (with its list's name, or bare where the program allows that) or a program instance and goes on through members and
 //! array elements. Case does not matter. What a VAR_IN_OUT, pointer or reference leads to changes while the program runs: it is not followed.
 
+use crate::address::{AddressError, parse_address};
 use crate::program::{Global, Program};
 use crate::types::{Type, TypeId, Types};
 use takt_abi::Section;
@@ -80,6 +81,13 @@ pub enum SymbolError {
         /// Its type.
         ty: String,
     },
+    /// Not a direct address, or none that anything in the program lies at.
+    Address {
+        /// The path.
+        path: String,
+        /// What is wrong with it; `None`: nothing lies there.
+        error: Option<AddressError>,
+    },
     /// A VAR_IN_OUT, pointer or reference would have to be followed.
     Indirect {
         /// The place.
@@ -105,14 +113,19 @@ impl std::fmt::Display for SymbolError {
             Self::Dimensions { within, expected, found } => write!(f, "`{within}` takes {expected} indices, found {found}"),
             Self::NotArray { within, ty } => write!(f, "`{within}` is `{ty}` and takes no index"),
             Self::NotStructure { within, ty } => write!(f, "`{within}` is `{ty}` and has no members"),
+            Self::Address { path, error: Some(error) } => write!(f, "`{path}` is not an address: {error}"),
+            Self::Address { path, error: None } => write!(f, "the program has nothing at `{path}`"),
             Self::Indirect { within } => write!(f, "`{within}` refers to another variable; name that one"),
         }
     }
 }
 impl std::error::Error for SymbolError {}
 
-/// The place that a path names: `GVL.Theta1.fActPosition`, `PLC_PRG.a[3].b`.
+/// The place that a path names: `GVL.Theta1.fActPosition`, `PLC_PRG.a[3].b`, `%IX0.3`.
 pub fn resolve(program: &Program, path: &str) -> Result<Place, SymbolError> {
+    if path.trim_start().starts_with('%') {
+        return direct(program, path.trim());
+    }
     let steps = split(path)?;
     let (global, used) = start(program, &steps)?;
     let mut walk = Walk { types: &program.types, name: global.name.clone(), ty: global.ty, offset: global.offset.into() };
@@ -123,6 +136,14 @@ pub fn resolve(program: &Program, path: &str) -> Result<Place, SymbolError> {
         }
     }
     Ok(Place { offset: u32::try_from(walk.offset).unwrap_or(u32::MAX), ty: walk.ty })
+}
+
+/// What lies at a direct address: `%IX0.3` is a bit, `%QW2` a WORD.
+fn direct(program: &Program, path: &str) -> Result<Place, SymbolError> {
+    let wrong = |error| SymbolError::Address { path: path.into(), error };
+    let address = parse_address(path, program.areas.word).map_err(|error| wrong(Some(error)))?;
+    let place = program.areas.offset(address).zip(program.types.find(&address.ty()));
+    place.map(|(offset, ty)| Place { offset, ty }).ok_or_else(|| wrong(None))
 }
 
 /// A part of a path.
@@ -260,7 +281,10 @@ mod tests {
 
     fn program() -> Program {
         let mut program = Program { image_size: 4096, ..Program::default() };
+        program.areas.ranges[2] = (2048, 8);
+        program.areas.word = true;
         let types = &mut program.types;
+        types.intern(Type::Elem(Elem::Word));
         let [int, lreal] = [Elem::Int, Elem::Lreal].map(|e| types.intern(Type::Elem(e)));
         let field = |name: &str, ty, offset, section| Field { name: name.into(), ty, offset, section, doc: String::new() };
         let mut structure = |name: &str, fields, size| {
@@ -311,6 +335,7 @@ mod tests {
         check("GVL.Axes[16#1,4]", 128 + 11 * 32);
         check("Other.Same", 1026);
         check("GVL.Ptr", 1032);
+        check("%MW2", 2052);
     }
 
     #[test]
@@ -328,6 +353,8 @@ mod tests {
         refused("Theta1[0]", "`GVL.Theta1` is `AXIS` and takes no index");
         refused("GVL.Same.x", "`GVL.Same` is `INT` and has no members");
         refused("GVL.Theta1.Ref", "`GVL.Theta1.Ref` refers to another variable; name that one");
+        refused("%IB0", "the program has nothing at `%IB0`");
+        refused("%MX0", "`%MX0` is not an address: the number of the bit is missing, as in `%IX0.3`");
         refused("GVL.Ptr.fActPosition", "`GVL.Ptr` refers to another variable; name that one");
     }
 

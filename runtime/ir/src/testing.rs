@@ -101,10 +101,15 @@ type reference 3
 type wstring 7
 type LREAL
 type interface "I_Base"
+type bit 3
+type BOOL
 global "GVL.x" type 0 at 64 bare
 global "GVL.p" type 2 at 96 constant doc "where it is"
+global "lamp" type 12 at 240
+area Q word at 240 size 2
+mapped Q type 13 at 65 to 241 bit 3
 task "Main" cyclic 1000000 priority 0 entry 0 stack 256 128
-task "Slow" event 64 priority 1 entry 0 stack 384 128
+task "Slow" event 64 bit 3 priority 1 entry 0 stack 384 128
 start 0
 body "PLC_PRG" () frame 32 @0
   local i64, f64, f32, addr:2, i64, addr:8, i64, i64

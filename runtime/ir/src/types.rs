@@ -102,6 +102,8 @@ pub enum Type {
         /// Upper bound.
         high: i128,
     },
+    /// One bit of a byte, a BOOL: a BIT in a STRUCT, `%IX0.3`. Nothing but a member or a global has this type.
+    Bit(u8),
     /// What an erroneous program means here; never in a program that runs.
     Error,
 }
@@ -132,6 +134,10 @@ impl Types {
     pub fn set(&mut self, id: TypeId, ty: Type) {
         self.all[id.0 as usize] = ty;
     }
+    /// The id of a type, if the program has it.
+    pub fn find(&self, ty: &Type) -> Option<TypeId> {
+        self.ids.get(ty).copied()
+    }
     /// The type.
     pub fn get(&self, id: TypeId) -> &Type {
         &self.all[id.0 as usize]
@@ -156,7 +162,7 @@ impl Types {
             Type::Enum(e) => (elem_size(e.base), elem_size(e.base)),
             Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) => (8, 8),
             Type::Subrange { base, .. } => (elem_size(*base), elem_size(*base)),
-            Type::Error => (1, 1),
+            Type::Bit(_) | Type::Error => (1, 1),
         }
     }
     /// Bytes.
@@ -182,6 +188,7 @@ impl Types {
             Type::Reference(t) => format!("REFERENCE TO {}", self.name(*t)),
             Type::Interface(name) => name.to_string(),
             Type::Subrange { base, low, high } => format!("{}({low}..{high})", elem_name(*base)),
+            Type::Bit(_) => "BIT".into(),
             Type::Error => "?".into(),
         }
     }

@@ -28,6 +28,7 @@ pub fn read_scalar(types: &Types, ty: TypeId, bytes: &[u8]) -> Option<Scalar> {
         Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) => Scalar::Int(word(bytes, 8)?.into()),
         Type::String(n) => Scalar::Text(String::from_utf8_lossy(string_bytes(bytes, *n)?).into_owned()),
         Type::WString(n) => Scalar::Text(String::from_utf16_lossy(&string_units(bytes, *n)?)),
+        Type::Bit(n) => Scalar::Bool(bit(bytes, *n)?),
         Type::Array { .. } | Type::OpenArray { .. } | Type::Struct(_) | Type::Error => return None,
     })
 }
@@ -43,6 +44,11 @@ fn read_elem(elem: Elem, bytes: &[u8]) -> Option<Scalar> {
         Elem::Sint | Elem::Int | Elem::Dint | Elem::Lint | Elem::Ltime => Scalar::Int((((raw << shift) as i64) >> shift).into()),
         _ => Scalar::Int(raw.into()),
     })
+}
+
+/// Whether a bit of the first byte is set.
+fn bit(bytes: &[u8], number: u8) -> Option<bool> {
+    Some(bytes.first()?.checked_shr(number.into())? & 1 != 0)
 }
 
 /// The first `size` bytes as an unsigned number.
@@ -95,6 +101,7 @@ fn put(types: &Types, ty: TypeId, bytes: &[u8], out: &mut String) -> Option<()> 
             out.push(')');
         }
         Type::Pointer(_) | Type::Reference(_) | Type::Interface(_) | Type::OpenArray { .. } => put_hex(bytes, 8, out)?,
+        Type::Bit(n) => out.push_str(if bit(bytes, *n)? { "TRUE" } else { "FALSE" }),
         Type::Error => return None,
     }
     Some(())

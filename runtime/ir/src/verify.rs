@@ -117,6 +117,10 @@ pub enum Defect {
     Family(u32),
     /// A heap that leaves the image or overlaps the stack region of a task, or is not 16 · 2ⁿ bytes long.
     Heap,
+    /// An area of direct addresses that leaves the image.
+    Area(usize),
+    /// A variable with an address from VAR_CONFIG that leaves the image, as its address does, or a bit that is no BOOL.
+    Mapped(usize),
     /// A handler that does not begin with [`crate::Inst::Catch`], or one of these anywhere else.
     Handler,
 }
@@ -152,6 +156,8 @@ impl std::fmt::Display for Defect {
             Self::Method(n) => write!(f, "method {n} is missing, or one of its bodies takes other parameters"),
             Self::Family(n) => write!(f, "there is no family {n}"),
             Self::Heap => write!(f, "the heap leaves the image, overlaps a stack region or has no possible size"),
+            Self::Area(n) => write!(f, "area {n} of direct addresses leaves the image"),
+            Self::Mapped(n) => write!(f, "variable {n} of VAR_CONFIG leaves the image, or its bit is no BOOL"),
             Self::Handler => write!(f, "a fault is caught where no handler begins, or a handler does not catch it"),
             Self::Resources => write!(f, "resources are not in rising order or leave the image"),
         }
@@ -222,7 +228,7 @@ fn tasks(program: &Program) -> Result<(), Defect> {
         ensure(fine, Defect::Stack(i))?;
         let possible = match task.trigger {
             Trigger::Cyclic(period) => period > 0,
-            Trigger::Event(offset) => in_image(program, offset, 1),
+            Trigger::Event(offset, bit) => in_image(program, offset, 1) && bit.is_none_or(|bit| bit < 8),
             Trigger::Freewheeling => true,
         };
         ensure(possible, Defect::Trigger(i))?;

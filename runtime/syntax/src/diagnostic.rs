@@ -109,6 +109,7 @@ codes! {
     E0315 BadOverride "a method or block does not go with what it overrides or extends",
     E0316 NotImplemented "a block lacks a member that its base or interface asks for",
     E0317 Abstract "an abstract block or method is used as if it had a body",
+    E0320 BadAddress "a direct address does not exist or does not go with what lies there",
     E0401 NoProgram "nothing to run: no program or task",
     E0402 BadTask "a task or configuration is not usable",
     E0403 TooLarge "the program needs more memory than an application may have",
@@ -131,6 +132,8 @@ codes! {
     W0310 MissingMember "a CASE leaves out members of its enumeration",
     W0311 TwoWriters "two tasks write the same variable",
     W0312 PointerType "a pointer gets the address of something of another type",
+    W0320 SharedAddress "two variables lie at addresses that overlap",
+    W0321 NoAddress "a variable waits for an address and gets none",
 }
 
 /// The page of a code such as `E0301`, in any case of its letter; `None` if there is no such code.

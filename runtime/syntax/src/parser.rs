@@ -119,6 +119,8 @@ struct Parser<'a> {
     home: Home,
     /// What [`Self::home`] was outside of each open NAMESPACE.
     outer_homes: Vec<Home>,
+    /// Direct addresses so far.
+    addresses: Vec<Direct>,
     /// Inside of `<…>`, where `>` closes and does not compare.
     is_in_angles: bool,
     diagnostics: Vec<Diagnostic>,
@@ -147,6 +149,7 @@ impl<'a> Parser<'a> {
             late_vars: Vec::new(),
             home: Home::default(),
             outer_homes: Vec::new(),
+            addresses: Vec::new(),
             is_in_angles: false,
             diagnostics: Vec::new(),
             lines: OnceCell::new(),
@@ -268,7 +271,9 @@ impl<'a> Parser<'a> {
 
     fn direct(&mut self) -> Direct {
         let token = self.bump();
-        Direct { text: self.text_of(token).to_ascii_uppercase(), span: self.span_of(token) }
+        let direct = Direct { text: self.text_of(token).to_ascii_uppercase(), span: self.span_of(token) };
+        self.addresses.push(direct.clone());
+        direct
     }
 
     // Messages.

@@ -30,6 +30,8 @@ pub struct Pragma {
 pub struct File {
     /// Program units in order.
     pub units: Vec<Unit>,
+    /// Every direct address in it, in order.
+    pub addresses: Vec<Direct>,
     /// `{warning disable W0301} … {warning restore W0301}`.
     pub suppressed: Vec<Suppressed>,
 }

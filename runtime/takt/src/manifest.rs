@@ -40,6 +40,15 @@ pub enum Arithmetic {
     Iec,
 }
 
+/// How the numbers of direct addresses count (DESIGN §8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Addressing {
+    /// In units of the address' own width: `%IW3` is bytes 6 and 7.
+    Word,
+    /// In bytes: `%IW3` is bytes 3 and 4.
+    Byte,
+}
+
 /// A variable joined to a channel of the bus.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wire {
@@ -60,6 +69,8 @@ pub struct Manifest {
     pub sources: Vec<Located<String>>,
     /// Integer arithmetic.
     pub arithmetic: Arithmetic,
+    /// How the numbers of direct addresses count, if given; else as the form of the sources wants it.
+    pub addressing: Option<Addressing>,
     /// Lossy implicit conversions are errors.
     pub strict: bool,
     /// Bytes of the heap of `__NEW`; 0 if not given.
@@ -127,6 +138,7 @@ fn project(table: &mut Table<'_, '_>, manifest: &mut Manifest) {
     manifest.name = table.string("name").map(|name| name.value);
     manifest.sources = table.strings("sources").unwrap_or_default();
     manifest.arithmetic = table.choice("arithmetic", &[("codesys", Arithmetic::Codesys), ("iec", Arithmetic::Iec)]).unwrap_or_default();
+    manifest.addressing = table.choice("addressing", &[("word", Addressing::Word), ("byte", Addressing::Byte)]);
     manifest.strict = table.boolean("strict").unwrap_or(false);
     manifest.heap = table.number("heap", 16.0..=1073741824.0).map_or(0, |bytes| bytes as u32);
 }

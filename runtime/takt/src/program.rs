@@ -1,6 +1,6 @@
 //! A project compiled: the program, what there is to say about it, and where conditions came from.
 
-use crate::manifest::{Arithmetic, Located};
+use crate::manifest::{Addressing, Arithmetic, Located};
 use crate::messages::Spot;
 use crate::places::Places;
 use crate::project::Project;
@@ -57,6 +57,8 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
         lint: true,
+        byte_addresses: project.manifest.addressing.map_or(project.sources.are_twincat(), |addressing| addressing == Addressing::Byte),
+        wired: project.manifest.wires.iter().map(|wire| wire.variable.value.clone()).collect(),
         heap: project.manifest.heap,
         defines: project.manifest.defines.clone(),
         conditions: conditions.iter().map(|condition| Source { name: name(condition), text: condition.text.clone() }).collect(),

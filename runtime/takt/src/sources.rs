@@ -43,6 +43,14 @@ pub struct Sources {
     pub findings: Vec<Diagnostic>,
 }
 
+impl Sources {
+    /// Whether any of the files is one of TwinCAT, where the numbers of direct addresses count bytes.
+    pub fn are_twincat(&self) -> bool {
+        let form = |source: &Source| Path::new(&source.name).extension().map(|form| form.to_string_lossy().to_lowercase());
+        self.list.iter().filter_map(form).any(|form| form == "plcproj" || form.starts_with("tc"))
+    }
+}
+
 /// Sources for people, as `takt import` writes them.
 #[derive(Debug, Clone, Default)]
 pub struct Export {

@@ -36,6 +36,7 @@ pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Type, ParseError> {
             let (low, high) = cursor.range(|t| t.parse().ok())?;
             Type::Subrange { base, low, high }
         }
+        "bit" => Type::Bit(cursor.number()?),
         "error" => Type::Error,
         other => return Err(cursor.wrong_last(&format!("expected a type, found `{other}`"))),
     })

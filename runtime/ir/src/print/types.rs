@@ -8,6 +8,7 @@
 //! type enum "WAY" INT { "forth" = 1, "back" = 2 }
 //! type pointer 0
 //! type subrange INT -5..5
+//! type bit 3
 //! ```
 
 use super::{Doc, Quoted};
@@ -36,6 +37,7 @@ pub(super) fn print(types: &Types, out: &mut String) -> fmt::Result {
             Type::Reference(target) => write!(out, "reference {}", target.0)?,
             Type::Interface(name) => write!(out, "interface {}", Quoted(name))?,
             Type::Subrange { base, low, high } => write!(out, "subrange {} {low}..{high}", elem_name(*base))?,
+            Type::Bit(n) => write!(out, "bit {n}")?,
             Type::Error => write!(out, "error")?,
         }
         out.push('\n');

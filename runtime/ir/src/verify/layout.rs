@@ -17,6 +17,16 @@ pub(super) fn check(program: &Program) -> Result<(), Defect> {
         let size = u32::try_from(sizes.of(global.ty, 0)?).map_err(|_| Defect::Global(i))?;
         ensure(in_image(program, global.offset, size), Defect::Global(i))?;
     }
+    for (i, (start, len)) in program.areas.ranges.into_iter().enumerate() {
+        ensure(len == 0 || in_image(program, start, len), Defect::Area(i))?;
+    }
+    for (i, mapped) in program.mapped.iter().enumerate() {
+        let size = u32::try_from(sizes.of(mapped.ty, 0)?).map_err(|_| Defect::Mapped(i))?;
+        let there = if mapped.bit.is_some() { 1 } else { size };
+        let bool = *program.types.get(mapped.ty) == Type::Elem(takt_abi::Elem::Bool);
+        let bit = mapped.bit.is_none_or(|bit| bit < 8 && bool);
+        ensure(bit && in_image(program, mapped.offset, size) && in_image(program, mapped.address, there), Defect::Mapped(i))?;
+    }
     Ok(())
 }
 
@@ -60,6 +70,10 @@ impl Sizes<'_> {
             }
             Type::String(n) => u64::from(*n) + 1,
             Type::WString(n) => 2 * u64::from(*n) + 2,
+            Type::Bit(n) => {
+                ensure(*n < 8, Defect::Type(id.0))?;
+                1
+            }
             Type::Elem(_) | Type::Enum(_) | Type::Subrange { .. } | Type::Interface(_) | Type::Error => types.size(id).into(),
         };
         ensure(size <= u32::MAX.into(), Defect::Type(id.0))?;

@@ -19,6 +19,7 @@ impl Parser<'_> {
             }
         }
         self.end_namespaces();
+        file.addresses = std::mem::take(&mut self.addresses);
         file
     }
 

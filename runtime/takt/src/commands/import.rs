@@ -33,7 +33,7 @@ pub(super) fn execute(args: &ImportArgs) -> Exit {
         check::summarise(errors, warnings);
         return Exit::Findings;
     }
-    match write(args, &export) {
+    match write(args, &export, checked.are_twincat()) {
         Ok(files) => {
             report(args, &files, &export.left);
             if is_whole { Exit::Good } else { Exit::Findings }
@@ -48,10 +48,11 @@ fn refuse(message: &str) -> Exit {
 }
 
 /// Writes the project and returns its files, relative to its folder.
-fn write(args: &ImportArgs, export: &Export) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
+fn write(args: &ImportArgs, export: &Export, is_twincat: bool) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
     let folder = args.to.file_name().map_or_else(|| "takt".into(), |name| name.to_string_lossy().into_owned());
     let name = toml::Value::String(args.name.clone().unwrap_or(folder));
-    create(&args.to, Path::new(MANIFEST), &format!("[project]\nname = {name}\n"))?;
+    let addressing = if is_twincat { "addressing = \"byte\"\n" } else { "" };
+    create(&args.to, Path::new(MANIFEST), &format!("[project]\nname = {name}\n{addressing}"))?;
     fs::create_dir_all(args.to.join("src")).map_err(|error| (args.to.join("src"), error))?;
     let mut files = vec![PathBuf::from(MANIFEST)];
     for (folder, name, text) in &export.units {

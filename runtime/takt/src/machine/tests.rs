@@ -137,3 +137,5 @@ fn a_fault_ends_the_run_and_names_its_line() {
     let fault = machine.fault().expect("a fault");
     assert_eq!((fault.fault, fault.place.file.as_str(), fault.place.line, fault.task.as_str()), (Fault::DivisionByZero, "main.st", 4, "t"));
 }
+
+mod addresses;
