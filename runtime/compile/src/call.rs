@@ -473,7 +473,11 @@ impl<'a> Lowering<'_, 'a> {
         let enable = self.enable(&names, args);
         let matched = self.match_arguments(&structure.name, &names, args);
         for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Input) {
-            self.set_input(&place, &structure.fields[*i], arg);
+            let field = &structure.fields[*i];
+            match self.generic_input(instance.ty, &field.name).zip(arg.value.as_ref()) {
+                Some((wanted, value)) if field.ty == self.c.any_type(arg.span) => self.set_description(&place, field, wanted, value),
+                _ => self.set_input(&place, field, arg),
+            }
         }
         for (i, field) in structure.fields.iter().enumerate().filter(|(_, f)| f.section == Section::InOut) {
             match matched.iter().find(|(n, _)| *n == i) {

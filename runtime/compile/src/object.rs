@@ -49,6 +49,14 @@ impl<'a> Lowering<'_, 'a> {
         Some(Operand { dynamic: true, ..self.at(place, ty, span) })
     }
 
+    /// Gives an expression that is lowered apart an instance that `THIS` can mean; what uses it is no constant.
+    pub(crate) fn imagine_instance(&mut self) {
+        let block = self.block().is_some_and(|class| self.c.pous[class].tree.kind == PouKind::FunctionBlock);
+        if block && self.this.is_none() {
+            self.this = Some(self.b.local(Ty::Addr(0)));
+        }
+    }
+
     /// What `THIS^` means.
     pub(crate) fn this_instance(&mut self, span: Span) -> Operand {
         let block = self.this.is_some();
