@@ -189,7 +189,7 @@ impl<'a> Lowering<'_, 'a> {
         for (i, v) in vars.iter().enumerate() {
             let given = matched.iter().find(|(n, _)| *n == i).map(|(_, a)| *a);
             if words[i].is_none() && given.is_none_or(|_| v.kind == VarKind::Output) && (all_known || v.kind == VarKind::Output) {
-                words[i] = self.missing_argument(&name, v, given, &mut outputs, span);
+                words[i] = self.missing_argument(pou, v, given, &mut outputs, span);
             }
         }
         let result = self.c.pous[pou].result;
@@ -260,7 +260,7 @@ impl<'a> Lowering<'_, 'a> {
     /// A parameter that was not given: its initial value, or a slot for an output.
     fn missing_argument(
         &mut self,
-        callee: &str,
+        unit: usize,
         v: &Variable<'a>,
         given: Option<&'a Arg>,
         outputs: &mut Vec<(&'a Arg, TypeId, u32)>,
@@ -275,7 +275,7 @@ impl<'a> Lowering<'_, 'a> {
             }
             VarKind::Input if v.init.is_some() => {
                 let Some(takt_syntax::tree::Init::Expr(e)) = v.init else { return None };
-                let mut scratch = Lowering::scratch(self.c, None);
+                let mut scratch = Lowering::scratch(self.c, Some(unit));
                 let operand = scratch.expr(e);
                 let operand = scratch.convert(operand, v.ty);
                 match operand.kind {
@@ -287,7 +287,9 @@ impl<'a> Lowering<'_, 'a> {
                 }
             }
             _ => {
-                self.report(Code::MissingArgument, span, format!("`{callee}` needs `{}` : `{}`", v.name, self.c.types.name(v.ty)));
+                let callee = &self.c.pous[unit].tree.name.text;
+                let message = format!("`{callee}` needs `{}` : `{}`", v.name, self.c.types.name(v.ty));
+                self.report(Code::MissingArgument, span, message);
                 None
             }
         }

@@ -387,6 +387,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
     pub(crate) fn name(&mut self, name: &str, span: Span) -> Thing {
         let Some(pou) = self.pou else { return self.global_thing(name, span) };
         let wanted = key(name);
+        if self.declare_ahead(&wanted, span) {
+            return Thing::Error;
+        }
         if let Some((level, i)) = self.local(&wanted)
             && (level == 0 || !self.is_result(pou, &wanted))
         {

@@ -7,6 +7,7 @@
 //! **The compiler knows no block by name.** It is handed libraries; what it knows itself are the operators and the overloaded functions of
 //! IEC 61131-3 (`ABS`, `LIMIT`, `INT_TO_REAL`, …).
 
+mod ahead;
 mod any;
 mod body;
 mod call;
