@@ -3,7 +3,7 @@
 use crate::body::Passing;
 use crate::enable::is_enable;
 use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
-use crate::object::Target;
+use crate::object::{Bound, Target};
 use crate::operator::Class;
 use crate::place::Place;
 use crate::scope::{Item, Owner, PouKind, Variable, key};
@@ -457,6 +457,11 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     pub(crate) fn call_instance(&mut self, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
+        self.call_part(instance, None, args, span)
+    }
+
+    /// Sets inputs, calls the body of an instance or one of its actions, and takes outputs.
+    pub(crate) fn call_part(&mut self, instance: Operand, action: Option<(Bound, usize)>, args: &'a [Arg], span: Span) -> Operand {
         if instance.is_error() {
             self.check_arguments(args);
             return instance;
@@ -484,7 +489,7 @@ impl<'a> Lowering<'_, 'a> {
         for (i, field) in structure.fields.iter().enumerate().filter(|(_, f)| f.section == Section::InOut) {
             match matched.iter().find(|(n, _)| *n == i) {
                 Some((_, arg)) => self.set_in_out(&place, field, arg),
-                None if matched.len() != self.given(&names, args) => {}
+                None if matched.len() != self.given(&names, args) || action.is_some() => {}
                 None => {
                     let (wanted, name) = (self.type_name(field.ty), &structure.name);
                     self.report(
@@ -495,7 +500,10 @@ impl<'a> Lowering<'_, 'a> {
                 }
             }
         }
-        self.invoke(&instance, &structure, &place, span);
+        match action {
+            Some((bound, unit)) => drop(self.call_bound(&bound, unit, &[], span)),
+            None => self.invoke(&instance, &structure, &place, span),
+        }
         for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Output) {
             let field = &structure.fields[*i];
             let value = self.at(place.inside(field.offset), field.ty, arg.span);
