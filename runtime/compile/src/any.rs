@@ -4,10 +4,10 @@ use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand};
 use crate::operator::Class;
 use crate::place::Place;
-use crate::scope::Item;
+use crate::scope::{Item, key};
 use crate::unit::Compiler;
 use takt_abi::Elem;
-use takt_ir::{Base, Inst, Local, Mem, Ty, Type, TypeId};
+use takt_ir::{Base, Field, Inst, Local, Mem, Ty, Type, TypeId};
 use takt_syntax::tree::{Arg, Expr, TypeExpr, TypeExprKind};
 use takt_syntax::{Code, Span};
 
@@ -55,11 +55,22 @@ pub(crate) fn generic(ty: &TypeExpr) -> Option<&str> {
 }
 
 impl<'a> Lowering<'_, 'a> {
-    /// The description of an argument: an address of [`Compiler::any_type`].
+    /// The generic type that an input of a block is declared with.
+    pub(crate) fn generic_input(&self, block: TypeId, name: &str) -> Option<&'a str> {
+        let pou = *self.c.pou_of_type.get(&block)?;
+        let var = self.c.bases(pou).find_map(|b| self.c.pous[b].index.get(&key(name)).map(|i| &self.c.pous[b].vars[*i]))?;
+        generic(&var.decl.ty)
+    }
+
+    /// The description of an argument: an address of [`Compiler::any_type`]. One that is a description already is handed on.
     pub(crate) fn describe(&mut self, wanted: &str, value: &'a Expr) -> Option<Local> {
         let operand = self.expr(value);
         if operand.is_error() {
             return None;
+        }
+        let any = self.c.any_type(value.span);
+        if let (true, Kind::Place(place @ Place::Memory { .. })) = (operand.ty == any, &operand.kind) {
+            return Some(self.address(&place.clone(), self.c.types.size(any)));
         }
         if matches!(operand.kind, Kind::Void) || !self.is_of(wanted, operand.ty) {
             let found = self.operand_name(&operand);
@@ -67,7 +78,6 @@ impl<'a> Lowering<'_, 'a> {
             return None;
         }
         let pointer = self.described(&operand);
-        let any = self.c.any_type(value.span);
         let (size, align) = self.c.types.layout(any);
         let slot = self.b.slot(size, align);
         let Type::Struct(structure) = self.c.types.get(any).clone() else { return None };
@@ -82,6 +92,15 @@ impl<'a> Lowering<'_, 'a> {
             self.b.push(Inst::Store { src, mem, base: Base::Frame, offset: slot + field.offset });
         }
         Some(self.b.address(Base::Frame, slot, size))
+    }
+
+    /// Sets an input of a block to the description of an argument.
+    pub(crate) fn set_description(&mut self, place: &Place, field: &Field, wanted: &str, value: &'a Expr) {
+        let Place::Memory { base, offset } = place.inside(field.offset) else { return };
+        if let Some(address) = self.describe(wanted, value) {
+            let len = self.c.types.size(field.ty);
+            self.b.push(Inst::Move { dst: base, dst_offset: offset, src: Base::Local(address), src_offset: 0, len });
+        }
     }
 
     /// `__VARINFO(variable)`: what is known of a variable, as `__SYSTEM.VAR_INFO`.

@@ -3,7 +3,7 @@
 use crate::body::Passing;
 use crate::enable::is_enable;
 use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
-use crate::object::Target;
+use crate::object::{Bound, Target};
 use crate::operator::Class;
 use crate::place::Place;
 use crate::scope::{Item, Owner, PouKind, Variable, key};
@@ -191,7 +191,7 @@ impl<'a> Lowering<'_, 'a> {
         for (i, v) in vars.iter().enumerate() {
             let given = matched.iter().find(|(n, _)| *n == i).map(|(_, a)| *a);
             if words[i].is_none() && given.is_none_or(|_| v.kind == VarKind::Output) && (all_known || v.kind == VarKind::Output) {
-                words[i] = self.missing_argument(&name, v, given, &mut outputs, span);
+                words[i] = self.missing_argument(pou, v, given, &mut outputs, span);
             }
         }
         let result = self.c.pous[pou].result;
@@ -262,7 +262,7 @@ impl<'a> Lowering<'_, 'a> {
     /// A parameter that was not given: its initial value, or a slot for an output.
     fn missing_argument(
         &mut self,
-        callee: &str,
+        unit: usize,
         v: &Variable<'a>,
         given: Option<&'a Arg>,
         outputs: &mut Vec<(&'a Arg, TypeId, u32)>,
@@ -277,7 +277,7 @@ impl<'a> Lowering<'_, 'a> {
             }
             VarKind::Input if v.init.is_some() => {
                 let Some(takt_syntax::tree::Init::Expr(e)) = v.init else { return None };
-                let mut scratch = Lowering::scratch(self.c, None);
+                let mut scratch = Lowering::scratch(self.c, Some(unit));
                 let operand = scratch.expr(e);
                 let operand = scratch.convert(operand, v.ty);
                 match operand.kind {
@@ -289,7 +289,9 @@ impl<'a> Lowering<'_, 'a> {
                 }
             }
             _ => {
-                self.report(Code::MissingArgument, span, format!("`{callee}` needs `{}` : `{}`", v.name, self.c.types.name(v.ty)));
+                let callee = &self.c.pous[unit].tree.name.text;
+                let message = format!("`{callee}` needs `{}` : `{}`", v.name, self.c.types.name(v.ty));
+                self.report(Code::MissingArgument, span, message);
                 None
             }
         }
@@ -458,6 +460,11 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     pub(crate) fn call_instance(&mut self, instance: Operand, args: &'a [Arg], span: Span) -> Operand {
+        self.call_part(instance, None, args, span)
+    }
+
+    /// Sets inputs, calls the body of an instance or one of its actions, and takes outputs.
+    pub(crate) fn call_part(&mut self, instance: Operand, action: Option<(Bound, usize)>, args: &'a [Arg], span: Span) -> Operand {
         if instance.is_error() {
             self.check_arguments(args);
             return instance;
@@ -476,12 +483,16 @@ impl<'a> Lowering<'_, 'a> {
         let enable = self.enable(&names, args);
         let matched = self.match_arguments(&structure.name, &names, args);
         for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Input) {
-            self.set_input(&place, &structure.fields[*i], arg);
+            let field = &structure.fields[*i];
+            match self.generic_input(instance.ty, &field.name).zip(arg.value.as_ref()) {
+                Some((wanted, value)) if field.ty == self.c.any_type(arg.span) => self.set_description(&place, field, wanted, value),
+                _ => self.set_input(&place, field, arg),
+            }
         }
         for (i, field) in structure.fields.iter().enumerate().filter(|(_, f)| f.section == Section::InOut) {
             match matched.iter().find(|(n, _)| *n == i) {
                 Some((_, arg)) => self.set_in_out(&place, field, arg),
-                None if matched.len() != self.given(&names, args) => {}
+                None if matched.len() != self.given(&names, args) || action.is_some() => {}
                 None => {
                     let (wanted, name) = (self.type_name(field.ty), &structure.name);
                     self.report(
@@ -492,7 +503,10 @@ impl<'a> Lowering<'_, 'a> {
                 }
             }
         }
-        self.invoke(&instance, &structure, &place, span);
+        match action {
+            Some((bound, unit)) => drop(self.call_bound(&bound, unit, &[], span)),
+            None => self.invoke(&instance, &structure, &place, span),
+        }
         for (i, arg) in matched.iter().filter(|(i, _)| names[*i].1 == Section::Output) {
             let field = &structure.fields[*i];
             let value = self.at(place.inside(field.offset), field.ty, arg.span);

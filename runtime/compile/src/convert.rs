@@ -28,6 +28,10 @@ impl Lowering<'_, '_> {
         if self.c.strict_enums.contains(&to) {
             return self.mismatch(a, to);
         }
+        let a = self.character(a, to);
+        if a.ty == to {
+            return a;
+        }
         if let Some(checked) = self.check_range(&a, to) {
             return self.explicit(checked, to);
         }
@@ -73,6 +77,16 @@ impl Lowering<'_, '_> {
             (Class::Moment(x), Class::Moment(y)) if x == y => Operand { ty: to, ..a },
             _ => self.mismatch(a, to),
         }
+    }
+
+    /// A literal of one character, where a CHAR or WCHAR is needed.
+    pub(crate) fn character(&mut self, a: Operand, to: TypeId) -> Operand {
+        let unit: i128 = match (&a.kind, self.class(to)) {
+            (Kind::Const(Value::Text(text)), Class::Char(Elem::Char)) if a.flex && text.len() == 1 => text[0].into(),
+            (Kind::Const(Value::Wide(text)), Class::Char(Elem::Wchar)) if a.flex && text.len() == 1 => text[0].into(),
+            _ => return a,
+        };
+        self.constant(Value::Int(unit), to, a.span)
     }
 
     /// As [`Lowering::convert`], for an operand beside others: what is computed in 64 bits stays so, folded or not.

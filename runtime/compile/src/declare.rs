@@ -102,6 +102,7 @@ impl<'a> Compiler<'a> {
             result: None,
             vars: Vec::new(),
             index: HashMap::new(),
+            begun: Default::default(),
             home: self.home,
             instance: 0,
             body: None,

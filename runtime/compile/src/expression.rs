@@ -61,6 +61,8 @@ impl Operand {
 
 /// Why an output is not written from outside.
 pub(crate) const BLOCK_OUTPUT: &str = "an output of a block";
+/// Why a local variable of a block is not written from outside.
+pub(crate) const BLOCK_VARIABLE: &str = "a VAR of a block, from outside,";
 
 /// What a name or path means.
 pub(crate) enum Thing {
@@ -381,6 +383,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
     pub(crate) fn name(&mut self, name: &str, span: Span) -> Thing {
         let Some(pou) = self.pou else { return self.global_thing(name, span) };
         let wanted = key(name);
+        if self.declare_ahead(&wanted, span) {
+            return Thing::Error;
+        }
         if let Some((level, i)) = self.local(&wanted)
             && (level == 0 || !self.is_result(pou, &wanted))
         {
@@ -639,13 +644,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
         // A block sees all of its own type and of what it extends: `THIS^.x`.
         let related = |unit: usize| self.block().is_some_and(|c| self.c.is_a(c, Owner::Pou(unit)) || self.c.is_a(unit, Owner::Pou(c)));
         let foreign = kind == StructKind::Block && !unit.is_some_and(related);
-        if foreign && matches!(field.section, Section::State | Section::InOut) {
-            let what = if field.section == Section::InOut { "VAR_IN_OUT" } else { "VAR" };
-            self.report(
-                Code::NotAccessible,
-                member.span,
-                format!("`{}` is a {what} of the block and cannot be used from outside", member.text),
-            );
+        if foreign && field.section == Section::InOut {
+            let message = format!("`{}` is a VAR_IN_OUT of the block and cannot be used from outside", member.text);
+            self.report(Code::NotAccessible, member.span, message);
             return Thing::Error;
         }
         if *self.c.types.get(field.ty) == Type::Error {
@@ -660,8 +661,10 @@ impl<'c, 'a> Lowering<'c, 'a> {
         let (place, ty) = self.bit_place(place.inside(field.offset), field.ty);
         let mut value = self.at(place, ty, span);
         value.fixed = operand.fixed;
-        if foreign && field.section == Section::Output {
-            value.fixed = Some(BLOCK_OUTPUT);
+        match field.section {
+            Section::Output if foreign => value.fixed = Some(BLOCK_OUTPUT),
+            Section::State if foreign => value.fixed = Some(BLOCK_VARIABLE),
+            _ => {}
         }
         Thing::Value(value)
     }

@@ -61,6 +61,7 @@ impl<'a> Compiler<'a> {
     /// Lowers `expr` apart and tells whether it is constant. With `want`, converted to it.
     pub(crate) fn known(&mut self, expr: &'a tree::Expr, pou: Option<usize>, want: Option<TypeId>) -> (Known, TypeId) {
         let mut lowering = Lowering::scratch(self, pou);
+        lowering.imagine_instance();
         let mut operand = lowering.expr(expr);
         if let Some(want) = want {
             operand = lowering.convert(operand, want);

@@ -8,6 +8,7 @@
 //! IEC 61131-3 (`ABS`, `LIMIT`, `INT_TO_REAL`, …).
 
 mod address;
+mod ahead;
 mod any;
 mod body;
 mod call;

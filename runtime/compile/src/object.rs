@@ -49,6 +49,14 @@ impl<'a> Lowering<'_, 'a> {
         Some(Operand { dynamic: true, ..self.at(place, ty, span) })
     }
 
+    /// Gives an expression that is lowered apart an instance that `THIS` can mean; what uses it is no constant.
+    pub(crate) fn imagine_instance(&mut self) {
+        let block = self.block().is_some_and(|class| self.c.pous[class].tree.kind == PouKind::FunctionBlock);
+        if block && self.this.is_none() {
+            self.this = Some(self.b.local(Ty::Addr(0)));
+        }
+    }
+
     /// What `THIS^` means.
     pub(crate) fn this_instance(&mut self, span: Span) -> Operand {
         let block = self.this.is_some();
@@ -143,7 +151,16 @@ impl<'a> Lowering<'_, 'a> {
             let value = self.follow(value);
             return self.call_instance(value, args, span);
         };
-        match self.bind(&bound, unit, Part::Call, span) {
+        match (bound.member, bound.instance.clone()) {
+            // `fb.Action(in := x, out => y)` sets inputs and takes outputs of the block, as `fb(…)` does.
+            (Member::Action(_), Some(instance)) if !args.is_empty() => self.call_part(instance, Some((bound, unit)), args, span),
+            _ => self.call_bound(&bound, unit, args, span),
+        }
+    }
+
+    /// Calls a method or action.
+    pub(crate) fn call_bound(&mut self, bound: &Bound, unit: usize, args: &'a [Arg], span: Span) -> Operand {
+        match self.bind(bound, unit, Part::Call, span) {
             Some(target) => self.call_unit(unit, target, Vec::new(), args, span),
             None => {
                 self.check_arguments(args);

@@ -253,6 +253,11 @@ impl<'a> Lowering<'_, 'a> {
         let (a, b) = match (self.class(a.ty), self.class(b.ty)) {
             (Class::Bool, Class::Int(_)) => (a, self.truth(b)),
             (Class::Int(_), Class::Bool) => (self.truth(a), b),
+            (Class::Char(_), Class::Text | Class::Wide) => {
+                let b = self.character(b, a.ty);
+                (a, b)
+            }
+            (Class::Text | Class::Wide, Class::Char(_)) => (self.character(a, b.ty), b),
             _ => (a, b),
         };
         let (ca, cb) = (self.class(a.ty), self.class(b.ty));

@@ -102,6 +102,8 @@ pub(crate) struct Pou<'a> {
     pub(crate) vars: Vec<Variable<'a>>,
     /// Where in `vars` a name is.
     pub(crate) index: HashMap<String, usize>,
+    /// Where the names of the constants stand whose declarations were begun.
+    pub(crate) begun: std::collections::HashSet<u32>,
     /// Offset of the singleton of a PROGRAM.
     pub(crate) instance: u32,
     /// Its body, once asked for.

@@ -1,7 +1,7 @@
 //! Checking and lowering statements.
 
 use crate::constant::{Value, range};
-use crate::expression::{Kind, Loop, Lowering, Operand};
+use crate::expression::{BLOCK_VARIABLE, Kind, Loop, Lowering, Operand};
 use crate::operator::{Class, is_unsigned_64};
 use crate::place::Place;
 use crate::scope::key;
@@ -218,8 +218,9 @@ impl<'a> Lowering<'_, 'a> {
         let place = match (&target.kind, target.fixed) {
             (Kind::Place(place), None) => place.clone(),
             (_, why) => {
+                let code = if why == Some(BLOCK_VARIABLE) { Code::NotAccessible } else { Code::NotAssignable };
                 let why = why.unwrap_or("an expression");
-                self.report(Code::NotAssignable, target.span, format!("{why} cannot be assigned"));
+                self.report(code, target.span, format!("{why} cannot be assigned"));
                 return;
             }
         };

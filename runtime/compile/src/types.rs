@@ -481,7 +481,9 @@ impl<'a> Compiler<'a> {
         self.pous[index].result = tree.result.map(|t| self.type_expr(t, Some(index), true));
         for block in tree.vars {
             for decl in &block.vars {
-                self.declare_variable(index, block, decl);
+                if !block.constant || self.begin_constant(index, decl) {
+                    self.declare_variable(index, block, decl);
+                }
             }
         }
         if matches!(tree.kind, PouKind::FunctionBlock | PouKind::Program) {
@@ -492,7 +494,7 @@ impl<'a> Compiler<'a> {
         self.pous[index].state = Progress::Done;
     }
 
-    fn declare_variable(&mut self, index: usize, block: &'a tree::VarBlock, decl: &'a tree::VarDecl) {
+    pub(crate) fn declare_variable(&mut self, index: usize, block: &'a tree::VarBlock, decl: &'a tree::VarDecl) {
         if block.kind == VarKind::External {
             if self.global_name(&decl.name.text).is_none() {
                 self.report(

@@ -46,7 +46,7 @@ impl Origin {
         let Some(first) = self.segment(range.start) else {
             return (&self.files[0], 0..0);
         };
-        let inside = range.start - first.at;
+        let inside = range.start.saturating_sub(first.at);
         let start = match first.is_copy() {
             true => (first.from + inside).min(first.to),
             false if inside >= first.length => first.to,
@@ -102,5 +102,18 @@ impl Lines<'_> {
         let (file, range) = self.origin.place(start + inside..start + inside);
         let (line, column) = self.files[segment.file].position(&file.text, range.start);
         Some((&file.name, line, column))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_before_the_first_segment_is_shown_at_its_beginning() {
+        let mut origin = Origin::new(Source { name: "A.TcPOU".into(), text: "<ST>x</ST>".into() });
+        origin.segments.push(Segment { at: 7, length: 1, file: 0, from: 4, to: 5 });
+        assert_eq!(origin.place(0..0).1, 4..4);
+        assert_eq!(origin.place(7..8).1, 4..5);
     }
 }
