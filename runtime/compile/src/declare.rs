@@ -48,7 +48,7 @@ impl<'a> Compiler<'a> {
             Unit::Interface(tree) => {
                 let ty = self.types.intern(takt_ir::Type::Interface(tree.name.text.as_str().into()));
                 let index = self.interfaces.len();
-                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), members: HashMap::new() });
+                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), all: Vec::new(), members: HashMap::new() });
                 self.interface_of_type.insert(ty, index);
                 self.interfaces[index].members = self.collect_members(library, Owner::Interface(index), &tree.methods, &tree.properties);
                 self.add(library, &tree.name, Item::Interface(index));
@@ -171,11 +171,12 @@ impl<'a> Compiler<'a> {
         };
         let qualified_only = attribute("qualified_only").is_some();
         let slot = attribute("global_init_slot").and_then(|p| p.value.as_deref()?.trim().parse().ok()).unwrap_or(0);
-        let list = match self.lists.iter().position(|l| key(&l.name) == key(&name)) {
-            Some(list) => list,
+        let list = match self.list_names.get(&key(&name)) {
+            Some(list) => *list,
             None => {
                 self.lists.push(List { name: name.clone(), qualified_only, vars: std::collections::HashMap::new(), slot });
                 let list = self.lists.len() - 1;
+                self.list_names.insert(key(&name), list);
                 self.add_bare(library, &name, Item::List(list));
                 list
             }
