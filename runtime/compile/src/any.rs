@@ -83,7 +83,7 @@ impl<'a> Lowering<'_, 'a> {
         let Type::Struct(structure) = self.c.types.get(any).clone() else { return None };
         let class = self.b.int(self.type_class(operand.ty));
         let bytes = self.b.int(self.c.types.size(operand.ty).into());
-        for field in structure.fields {
+        for field in &structure.fields {
             let (src, mem) = match field.name.as_str() {
                 "pValue" => (pointer, Mem::I64),
                 "diSize" => (bytes, Mem::I32),

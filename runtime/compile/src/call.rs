@@ -6,7 +6,7 @@ use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
 use crate::object::{Bound, Target};
 use crate::operator::Class;
 use crate::place::Place;
-use crate::scope::{Item, Owner, PouKind, Variable, key};
+use crate::scope::{Item, Owner, PouKind, Variable, key, same};
 use crate::types::nearest;
 use takt_abi::{FnDesc, Section};
 use takt_ir::{Base, Field, Inst, Local, Mem, StructKind, Structure, Ty, Type, TypeId};
@@ -109,7 +109,7 @@ impl<'a> Lowering<'_, 'a> {
         let positional: Vec<usize> = names.iter().enumerate().filter(|(_, n)| n.1 != Section::State).map(|(i, _)| i).collect();
         for (position, arg) in args.iter().filter(|arg| !is_enable(arg, names)).enumerate() {
             let found = match &arg.name {
-                Some(name) => names.iter().position(|(n, s)| key(n) == key(&name.text) && *s != Section::State),
+                Some(name) => names.iter().position(|(n, s)| same(n, &name.text) && *s != Section::State),
                 None => positional.get(position).copied(),
             };
             let Some(i) = found else {

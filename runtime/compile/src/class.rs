@@ -1,11 +1,12 @@
 //! Blocks that extend blocks and implement interfaces: who is of which type, and which body a method has for each class.
 
+use crate::limits::EXTENDS;
 use crate::scope::{Item, Member, Owner, PouKind, key};
 use crate::unit::Compiler;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use takt_ir::{BodyId, Class, Dispatch, Family, Ty};
 use takt_syntax::tree::{Name, VarKind};
-use takt_syntax::{Code, Note};
+use takt_syntax::{Code, Note, Span};
 
 /// Methods that are found by class at run time: the type that declares them and their key (see [`method_key`]).
 #[derive(Debug, Default)]
@@ -62,7 +63,12 @@ impl<'a> Compiler<'a> {
             self.link_interface(i);
         }
         for i in 0..self.interfaces.len() {
-            self.interfaces[i].all = self.interface_bases(i);
+            self.interfaces[i].all = self.extended(i);
+            if self.interfaces[i].all.len() > EXTENDS {
+                self.interfaces[i].all.truncate(1);
+                self.extends_too_many(self.interfaces[i].tree.name.span, "interfaces");
+                break;
+            }
         }
         for (owner, name) in std::mem::take(&mut self.extends) {
             if let Owner::Pou(pou) = owner {
@@ -89,7 +95,7 @@ impl<'a> Compiler<'a> {
         self.home = Some(&tree.home);
         for name in &tree.extends {
             let Some(base) = self.named_interface(name) else { continue };
-            if self.interface_bases(base).contains(&i) {
+            if self.extended(base).contains(&i) {
                 self.report(Code::Circular, name.span, format!("`{}` extends itself", tree.name.text));
                 continue;
             }
@@ -147,14 +153,19 @@ impl<'a> Compiler<'a> {
 
     /// Numbers a block and what extends it, one behind the other, so that the classes of a type lie together.
     fn number(&mut self, root: usize) {
-        let mut open = vec![root];
-        while let Some(pou) = open.pop() {
+        let mut open = vec![(root, 0)];
+        while let Some((pou, depth)) = open.pop() {
+            if depth > EXTENDS {
+                self.extends_too_many(self.pous[pou].tree.name.span, "blocks");
+                self.pous[pou].base = None;
+            }
+            let depth = if depth > EXTENDS { 0 } else { depth + 1 };
             let unit = &self.pous[pou];
             if unit.base.is_some() || !unit.children.is_empty() || !unit.implements.is_empty() {
                 self.classes.push(pou);
                 self.pous[pou].class = self.classes.len() as u32;
             }
-            open.extend(self.pous[pou].children.iter().rev());
+            open.extend(self.pous[pou].children.iter().rev().map(|child| (*child, depth)));
         }
     }
 
@@ -163,26 +174,30 @@ impl<'a> Compiler<'a> {
         std::iter::successors(Some(pou), |pou| self.pous[*pou].base)
     }
 
-    /// An interface and what it extends, directly or through others, each once.
-    fn interface_bases(&self, interface: usize) -> Vec<usize> {
-        let mut found = vec![interface];
-        let mut next = 0;
-        while let Some(interface) = found.get(next).copied() {
-            next += 1;
-            for base in &self.interfaces[interface].extends {
-                if !found.contains(base) {
-                    found.push(*base);
-                }
+    /// An interface and what it extends, each once, in the order in which members are looked for.
+    fn extended(&self, interface: usize) -> Vec<usize> {
+        let (mut all, mut seen, mut open) = (Vec::new(), HashSet::new(), vec![interface]);
+        while let Some(next) = open.pop().filter(|_| all.len() <= EXTENDS) {
+            if seen.insert(next) {
+                all.push(next);
+                open.extend(self.interfaces[next].extends.iter().rev());
             }
         }
-        found
+        all
+    }
+
+    fn extends_too_many(&mut self, at: Span, what: &str) {
+        let message = format!("this extends more than {EXTENDS} {what}, directly or through others");
+        self.report(Code::TooDeep, at, message).help = Some("extend fewer of them and put instances into the block instead".into());
     }
 
     /// Whether a block is of the type `of`.
     pub(crate) fn is_a(&self, pou: usize, of: Owner) -> bool {
         match of {
             Owner::Pou(base) => self.bases(pou).any(|b| b == base),
-            Owner::Interface(i) => self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| self.interface_is(*own, i))),
+            Owner::Interface(i) => {
+                self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| *own == i || self.interface_is(*own, i)))
+            }
         }
     }
 
@@ -203,8 +218,7 @@ impl<'a> Compiler<'a> {
 
     /// The members of an interface and of what it extends.
     pub(crate) fn interface_members(&self, interface: usize) -> Vec<&Member> {
-        let own = &self.interfaces[interface];
-        own.members.values().chain(own.extends.iter().flat_map(|i| self.interface_members(*i))).collect()
+        self.interfaces[interface].all.iter().flat_map(|i| self.interfaces[*i].members.values()).collect()
     }
 
     /// The unit that a block runs for a method.
@@ -286,10 +300,14 @@ impl<'a> Compiler<'a> {
 
     /// Fills the tables of methods, families and classes; lowering a body may ask for more.
     pub(crate) fn finish_classes(&mut self) {
+        let implementors = self.implementors();
         let mut done = 0;
         while done < self.methods.all.len() {
             let (owner, method) = self.methods.all[done].clone();
-            let targets: Vec<Option<BodyId>> = self.classes.clone().into_iter().map(|pou| self.target(pou, owner, &method)).collect();
+            let mut targets: Vec<Option<BodyId>> = vec![None; self.classes.len()];
+            for class in self.classes_of(owner, &implementors) {
+                targets[class] = self.target(self.classes[class], &method);
+            }
             let low = targets.iter().position(Option::is_some).unwrap_or(0);
             let end = targets.iter().rposition(Option::is_some).map_or(low, |last| last + 1);
             let row = &mut self.program.dispatch[done];
@@ -298,7 +316,8 @@ impl<'a> Compiler<'a> {
             self.drain();
         }
         for of in self.families.clone() {
-            let members = self.classes.iter().map(|pou| self.is_a(*pou, of)).collect();
+            let mut members = vec![false; self.classes.len()];
+            self.classes_of(of, &implementors).into_iter().for_each(|class| members[class] = true);
             self.program.families.push(Family { name: self.owner_name(of), low: 1, members });
         }
         for pou in self.classes.clone() {
@@ -307,8 +326,35 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn target(&mut self, pou: usize, owner: Owner, method: &str) -> Option<BodyId> {
-        if !self.is_a(pou, owner) || self.pous[pou].tree.modifiers.is_abstract {
+    /// Indices of the classes that implement an interface, for each interface.
+    fn implementors(&self) -> Vec<Vec<usize>> {
+        let mut found = vec![Vec::new(); self.interfaces.len()];
+        for (class, pou) in self.classes.iter().enumerate() {
+            for own in self.bases(*pou).flat_map(|base| &self.pous[base].implements) {
+                for interface in &self.interfaces[*own].all {
+                    if found[*interface].last() != Some(&class) {
+                        found[*interface].push(class);
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// Indices of the classes of a type.
+    fn classes_of(&self, of: Owner, implementors: &[Vec<usize>]) -> Vec<usize> {
+        match of {
+            Owner::Interface(i) => implementors[i].clone(),
+            // What extends a block is numbered behind it.
+            Owner::Pou(pou) => {
+                let first = (self.pous[pou].class as usize).saturating_sub(1);
+                (first..self.classes.len()).take_while(|class| self.is_a(self.classes[*class], of)).collect()
+            }
+        }
+    }
+
+    fn target(&mut self, pou: usize, method: &str) -> Option<BodyId> {
+        if self.pous[pou].tree.modifiers.is_abstract {
             return None;
         }
         let unit = self.unit_for(pou, method)?;
@@ -439,12 +485,10 @@ impl<'a> Compiler<'a> {
                 }
             }
         }
-        let own = self.pous[pou].implements.clone();
-        let mut wanted: Vec<usize> = own.into_iter().flat_map(|interface| self.interfaces[interface].all.clone()).collect();
-        wanted.sort_unstable();
-        wanted.dedup();
-        for interface in wanted {
-            self.check_interface(pou, interface, &mut missing);
+        for own in self.pous[pou].implements.clone() {
+            for interface in self.interfaces[own].all.clone() {
+                self.check_interface(pou, interface, &mut missing);
+            }
         }
         missing.dedup();
         if !missing.is_empty() {

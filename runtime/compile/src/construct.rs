@@ -8,7 +8,7 @@ use crate::expression::{Lowering, Operand};
 use crate::initial::{Late, What};
 use crate::object::Target;
 use crate::place::Place;
-use crate::scope::{Member, key};
+use crate::scope::{Member, key, same};
 use crate::unit::Compiler;
 use takt_abi::Elem;
 use takt_ir::{Base, Body, BodyId, Inst, Local, Op, StructKind, Term, Ty, Type, TypeId};
@@ -179,7 +179,7 @@ impl<'a> Lowering<'_, 'a> {
             if args.is_some() {
                 continue;
             }
-            let given = all.iter().find(|a| a.name.as_ref().is_some_and(|n| key(&n.text) == key(&v.name)));
+            let given = all.iter().find(|a| a.name.as_ref().is_some_and(|n| same(&n.text, &v.name)));
             if let Some(value) = given.and_then(|a| a.value.as_ref()) {
                 let operand = self.expr(value);
                 if let Some(operand) = self.for_parameter(operand, v.ty) {
@@ -211,7 +211,7 @@ impl<'a> Lowering<'_, 'a> {
             (Init::Expr(e), _) => self.set_initial(base, offset, ty, e),
             (Init::Struct(members, _), Type::Struct(s)) => {
                 for (name, init) in members {
-                    if let Some(field) = s.fields.iter().find(|f| key(&f.name) == key(&name.text)) {
+                    if let Some(field) = s.fields.iter().find(|f| same(&f.name, &name.text)) {
                         self.set_again(&place.inside(field.offset), field.ty, init);
                     }
                 }

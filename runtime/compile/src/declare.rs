@@ -174,11 +174,12 @@ impl<'a> Compiler<'a> {
         };
         let qualified_only = attribute("qualified_only").is_some();
         let slot = attribute("global_init_slot").and_then(|p| p.value.as_deref()?.trim().parse().ok()).unwrap_or(0);
-        let list = match self.lists.iter().position(|l| key(&l.name) == key(&name)) {
-            Some(list) => list,
+        let list = match self.list_names.get(&key(&name)) {
+            Some(list) => *list,
             None => {
                 self.lists.push(List { name: name.clone(), qualified_only, vars: std::collections::HashMap::new(), slot });
                 let list = self.lists.len() - 1;
+                self.list_names.insert(key(&name), list);
                 self.add_bare(library, &name, Item::List(list));
                 list
             }

@@ -4,7 +4,7 @@ use crate::constant::Value;
 use crate::emit::Builder;
 use crate::object::Bound;
 use crate::place::Place;
-use crate::scope::{Item, Owner, PouKind, Storage, key};
+use crate::scope::{Item, Owner, PouKind, Storage, key, same};
 use crate::types::{elementary, nearest};
 use crate::unit::Compiler;
 use takt_abi::{Elem, FnDesc, Section};
@@ -258,6 +258,15 @@ impl<'c, 'a> Lowering<'c, 'a> {
 
     /// Lowers an expression that has a value.
     pub(crate) fn expr(&mut self, e: &'a Expr) -> Operand {
+        if !self.c.deeper(1, e.span) {
+            return self.error(e.span);
+        }
+        let operand = self.expr_inside(e);
+        self.c.back(1);
+        operand
+    }
+
+    fn expr_inside(&mut self, e: &'a Expr) -> Operand {
         match &e.kind {
             ExprKind::Literal(literal) => self.literal(literal, e.span),
             ExprKind::Unary(op, a) => {
@@ -470,7 +479,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
         }
     }
 
-    fn suggest(&self, name: &str) -> Option<String> {
+    fn suggest(&mut self, name: &str) -> Option<String> {
+        let seen: usize = self.levels.iter().map(|l| self.c.pous[l.pou].vars.len()).sum();
+        if !self.c.may_compare(seen) {
+            return None;
+        }
         let seen = || self.levels.iter().flat_map(|l| &self.c.pous[l.pou].vars);
         match nearest(&key(name), seen().map(|v| key(&v.name))) {
             Some(found) => {
@@ -533,7 +546,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
         self.c.resolve_global(i);
         let Some(var) = &self.c.globals[i].var else { return self.error(span) };
         let (ty, value, storage, constant) = (var.ty, var.value.clone(), var.storage.clone(), var.constant);
-        if *self.c.types.get(ty) == Type::Error {
+        // What was wrong with a constant has been said where it is declared.
+        let failed = constant && value.is_none() && var.init.is_some() && self.c.folds(ty);
+        if failed || *self.c.types.get(ty) == Type::Error {
             return self.error(span);
         }
         if let Some(value) = value {
@@ -557,7 +572,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
             }
             return Thing::Error;
         };
-        match e.members.iter().find(|(n, _)| key(n) == key(&member.text)) {
+        match e.members.iter().find(|(n, _)| same(n, &member.text)) {
             Some((_, value)) => {
                 let value = Value::Int((*value).into());
                 Thing::Value(self.constant(value, ty, member.span))
@@ -628,7 +643,7 @@ impl<'c, 'a> Lowering<'c, 'a> {
                 None => self.no_member(&operand, member),
             };
         };
-        let (kind, found) = (structure.kind, structure.fields.iter().find(|f| key(&f.name) == wanted).cloned());
+        let (kind, found) = (structure.kind, structure.fields.iter().find(|f| same(&f.name, &member.text)).cloned());
         let unit = self.c.pou_of_type.get(&operand.ty).copied();
         let constant = unit.and_then(|unit| {
             let var = self.c.bases(unit).find_map(|b| self.c.pous[b].index.get(&wanted).map(|i| &self.c.pous[b].vars[*i]))?;

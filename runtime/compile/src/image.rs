@@ -32,7 +32,7 @@ impl<'a> Compiler<'a> {
         self.lay_out_areas();
         let mut order: Vec<usize> = (0..self.globals.len()).collect();
         let list = |i: &usize| self.globals[*i].list.map(|l| (self.lists[l].slot, key(&self.lists[l].name)));
-        order.sort_by_key(list);
+        order.sort_by_cached_key(list);
         for i in order {
             self.lay_out_global(i);
         }

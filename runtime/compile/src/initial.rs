@@ -2,7 +2,7 @@
 
 use crate::constant::{Value, store};
 use crate::expression::{Kind, Lowering, Operand};
-use crate::scope::{Progress, key};
+use crate::scope::{Progress, key, same};
 use crate::unit::Compiler;
 use std::rc::Rc;
 use takt_ir::{Base, StructKind, Type, TypeId};
@@ -91,13 +91,18 @@ impl<'a> Compiler<'a> {
         }
     }
 
+    /// Whether constants of a type have a [`Value`]: scalars and strings.
+    pub(crate) fn folds(&self, ty: TypeId) -> bool {
+        !matches!(
+            self.types.get(ty),
+            Type::Array { .. } | Type::Struct(_) | Type::Error | Type::Pointer(_) | Type::Reference(_) | Type::Interface(_)
+        )
+    }
+
     /// The value of a scalar or string CONSTANT.
     pub(crate) fn constant_of(&mut self, decl: &'a tree::VarDecl, ty: TypeId, pou: Option<usize>) -> Option<Value> {
         let Some(Init::Expr(expr)) = &decl.init else { return None };
-        if matches!(
-            self.types.get(ty),
-            Type::Array { .. } | Type::Struct(_) | Type::Error | Type::Pointer(_) | Type::Reference(_) | Type::Interface(_)
-        ) {
+        if !self.folds(ty) {
             return None;
         }
         match self.known(expr, pou, Some(ty)).0 {
@@ -289,7 +294,7 @@ impl<'a> Compiler<'a> {
             return;
         };
         for (name, init) in members {
-            let Some(field) = structure.fields.iter().find(|f| key(&f.name) == key(&name.text)) else {
+            let Some(field) = structure.fields.iter().find(|f| same(&f.name, &name.text)) else {
                 self.report(Code::UnknownMember, name.span, format!("`{}` has no member `{}`", structure.name, name.text));
                 continue;
             };

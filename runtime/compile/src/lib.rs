@@ -26,6 +26,7 @@ mod image;
 mod initial;
 mod intrinsic;
 mod library;
+mod limits;
 mod lint;
 mod mistake;
 mod namespace;
@@ -118,7 +119,8 @@ pub fn compile(input: Input<'_>) -> Output {
     let mut diagnostics = unit.finish();
     diagnostics.retain(|d| !trees.get(d.span.file.0 as usize).is_some_and(|tree| tree.suppresses(d)));
     diagnostics.sort_by_key(|d| (d.span.file, d.span.start, d.span.end, d.code));
-    diagnostics.dedup();
+    // What is looked at twice is reported once; a guess at what was meant may be missing the second time.
+    diagnostics.dedup_by(|again, first| (again.span, again.code, &again.message) == (first.span, first.code, &first.message));
     let failed = diagnostics.iter().any(|d| d.severity() == takt_syntax::Severity::Error);
     Output { program: (!failed).then_some(program), diagnostics, conditions, files }
 }

@@ -3,6 +3,7 @@
 use crate::scope::{Item, key};
 use crate::unit::Compiler;
 use std::rc::Rc;
+use std::sync::Arc;
 use takt_abi::{FieldDesc, FieldType, Section, StructDesc};
 use takt_ir::{Enumeration, Field, StructKind, Structure, Type, TypeId};
 
@@ -68,7 +69,7 @@ impl Compiler<'_> {
                 let to = self.native_type(to);
                 self.types.intern(Type::Pointer(to))
             }
-            FieldType::Enum(desc) => self.types.intern(Type::Enum(Box::new(Enumeration {
+            FieldType::Enum(desc) => self.types.intern(Type::Enum(Arc::new(Enumeration {
                 name: desc.name.into(),
                 base: desc.base,
                 members: desc.members.iter().map(|(n, v)| ((*n).into(), *v)).collect(),
@@ -104,7 +105,7 @@ impl Compiler<'_> {
         });
         let fields = fields.collect();
         let ty =
-            self.types.push(Type::Struct(Box::new(Structure { name: name.into(), kind, fields, size: size as u32, align: align as u32 })));
+            self.types.push(Type::Struct(Arc::new(Structure { name: name.into(), kind, fields, size: size as u32, align: align as u32 })));
         let mut bytes = vec![0; size];
         init(&mut bytes);
         self.type_init.insert(ty, Rc::new(bytes));

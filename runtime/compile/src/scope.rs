@@ -9,7 +9,12 @@ use takt_syntax::tree::{self, Modifiers, VarKind};
 
 /// The key under which a name is found.
 pub(crate) fn key(name: &str) -> String {
-    name.to_uppercase()
+    if name.is_ascii() { name.to_ascii_uppercase() } else { name.to_uppercase() }
+}
+
+/// Whether two names are the same: have the same [`key`].
+pub(crate) fn same(a: &str, b: &str) -> bool {
+    if a.is_ascii() && b.is_ascii() { a.eq_ignore_ascii_case(b) } else { key(a) == key(b) }
 }
 
 /// Where a variable lives.
@@ -135,7 +140,7 @@ pub(crate) struct Interface<'a> {
     pub(crate) tree: &'a tree::Interface,
     pub(crate) ty: TypeId,
     pub(crate) extends: Vec<usize>,
-    /// Itself and all that it extends, directly or through others.
+    /// Itself and what it extends, directly or through others, each once.
     pub(crate) all: Vec<usize>,
     pub(crate) members: HashMap<String, Member>,
 }

@@ -4,7 +4,7 @@ use crate::constant::Value;
 use crate::expression::{Kind, Lowering};
 use crate::initial::Known;
 use crate::place::Place;
-use crate::scope::{Item, PouKind, key};
+use crate::scope::{Item, PouKind, key, same};
 use crate::unit::Compiler;
 use takt_ir::{Base, BodyId, Task, Term, Trigger};
 use takt_syntax::tree::{self, Unit};
@@ -78,7 +78,7 @@ impl<'a> Compiler<'a> {
     fn configured_tasks(&mut self, configuration: &'a tree::Configuration) -> Vec<Planned> {
         let mut tasks: Vec<Planned> = Vec::new();
         for task in &configuration.tasks {
-            if tasks.iter().any(|t| key(&t.name) == key(&task.name.text)) {
+            if tasks.iter().any(|t| same(&t.name, &task.name.text)) {
                 self.report(Code::DuplicateName, task.name.span, format!("the task `{}` is declared twice", task.name.text));
                 continue;
             }
@@ -88,7 +88,7 @@ impl<'a> Compiler<'a> {
             tasks.push(Planned { name: task.name.text.clone(), trigger, priority, entry, span: task.name.span });
         }
         for program in &configuration.programs {
-            let known = program.task.as_ref().is_some_and(|t| configuration.tasks.iter().any(|d| key(&d.name.text) == key(&t.text)));
+            let known = program.task.as_ref().is_some_and(|t| configuration.tasks.iter().any(|d| same(&d.name.text, &t.text)));
             if !known {
                 let (span, message) = match &program.task {
                     Some(task) => (task.span, format!("the task `{}` is not declared", task.text)),
@@ -109,7 +109,7 @@ impl<'a> Compiler<'a> {
     /// The programs of a task with their connections.
     fn programs_of(&mut self, configuration: &'a tree::Configuration, task: &tree::Name) -> Vec<(usize, &'a [tree::Arg])> {
         let mut programs = Vec::new();
-        for program in configuration.programs.iter().filter(|p| p.task.as_ref().is_some_and(|t| key(&t.text) == key(&task.text))) {
+        for program in configuration.programs.iter().filter(|p| p.task.as_ref().is_some_and(|t| same(&t.text, &task.text))) {
             match self.global_name(&program.ty.text) {
                 Some(Item::Pou(i)) if self.pous[i].tree.kind == PouKind::Program => {
                     programs.push((i, program.connections.as_slice()));

@@ -2,9 +2,13 @@
 
 use crate::constant::{Value, cut, range};
 use crate::initial::Target;
+use crate::limits::DECLARATION;
 use crate::scope::{Item, PouKind, Progress, Storage, Variable, key};
 use crate::unit::Compiler;
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
+use std::sync::Arc;
 use takt_abi::{Elem, Section};
 use takt_ir::{Enumeration, Field, StructKind, Structure, Type, TypeId};
 use takt_syntax::tree::{self, TypeExpr, TypeExprKind, TypeKind, VarKind};
@@ -203,12 +207,16 @@ impl<'a> Compiler<'a> {
                 return id;
             }
         }
+        if !self.deeper(DECLARATION, at) {
+            return self.error_type();
+        }
         self.declared[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.declared[index].home);
         self.inside.push((&tree.name, at));
         let ty = self.define(index, tree);
         self.inside.pop();
         self.home = home;
+        self.back(DECLARATION);
         self.declared[index].ty = Some(ty);
         self.declared[index].state = Progress::Done;
         ty
@@ -264,13 +272,17 @@ impl<'a> Compiler<'a> {
                 Elem::Int
             }),
         };
+        let mut values: HashMap<String, i64> = HashMap::new();
         let mut next = 0i128;
         let mut members: Vec<(String, i64)> = Vec::new();
         for (member, value) in &body.members {
             if let Some(expr) = value {
-                next = self.enum_value(expr, pou, &members).unwrap_or(next);
+                next = self.enum_value(expr, pou, &values).unwrap_or(next);
             }
-            if members.iter().any(|(n, _)| key(n) == key(&member.text)) {
+            let value = cut(next, base) as i64;
+            if let Entry::Vacant(new) = values.entry(key(&member.text)) {
+                new.insert(value);
+            } else {
                 let first = body.members.iter().find(|(n, _)| key(&n.text) == key(&member.text)).map(|(n, _)| n.span);
                 self.declared_twice(member, Some(name).filter(|n| !n.starts_with('(')), first);
             }
@@ -282,14 +294,14 @@ impl<'a> Compiler<'a> {
                     format!("the value {next} of `{}` does not fit the base type `{}`", member.text, takt_ir::elem_name(base)),
                 );
             }
-            members.push((member.text.clone(), cut(next, base) as i64));
+            members.push((member.text.clone(), value));
             next += 1;
         }
         let init = match &body.init {
-            Some(expr) => self.enum_value(expr, pou, &members),
+            Some(expr) => self.enum_value(expr, pou, &values),
             None => members.first().map(|(_, v)| i128::from(*v)),
         };
-        let ty = self.types.intern(Type::Enum(Box::new(Enumeration { name: name.into(), base, members })));
+        let ty = self.types.intern(Type::Enum(Arc::new(Enumeration { name: name.into(), base, members })));
         if let Some(init) = init.filter(|v| *v != 0) {
             let mut bytes = vec![0; takt_ir::elem_size(base) as usize];
             crate::constant::store(&Value::Int(init), base, &mut bytes);
@@ -299,9 +311,9 @@ impl<'a> Compiler<'a> {
     }
 
     /// The value of an enumerator, which may name those before it.
-    fn enum_value(&mut self, expr: &'a tree::Expr, pou: Option<usize>, members: &[(String, i64)]) -> Option<i128> {
+    fn enum_value(&mut self, expr: &'a tree::Expr, pou: Option<usize>, before: &HashMap<String, i64>) -> Option<i128> {
         if let tree::ExprKind::Name(name) = &expr.kind
-            && let Some((_, value)) = members.iter().find(|(n, _)| key(n) == key(name))
+            && let Some(value) = before.get(&key(name))
         {
             return Some((*value).into());
         }
@@ -357,10 +369,11 @@ impl<'a> Compiler<'a> {
         pack: Option<u32>,
     ) -> TypeId {
         let (mut layout, mut fields) = self.inherited(base);
+        let mut names: HashSet<String> = fields.iter().map(|f| key(&f.name)).collect();
         for decl in decls {
             let declared = self.variable_type(decl, None);
             self.note_address(decl, declared, false, crate::address::Section::Structure(id));
-            if fields.iter().any(|f| key(&f.name) == key(&decl.name.text)) {
+            if !names.insert(key(&decl.name.text)) {
                 let first = decls.iter().find(|d| key(&d.name.text) == key(&decl.name.text) && d.name.span != decl.name.span);
                 self.declared_twice(&decl.name, Some(name), first.map(|d| d.name.span));
             }
@@ -388,7 +401,7 @@ impl<'a> Compiler<'a> {
         let (size, align) = layout.end();
         self.too_large(size, decls.first().map(|d| d.name.span));
         let offsets: Vec<_> = fields.iter().map(|f| (f.offset, f.ty)).collect();
-        self.types.set(id, Type::Struct(Box::new(Structure { name: name.into(), kind, fields, size, align })));
+        self.types.set(id, Type::Struct(Arc::new(Structure { name: name.into(), kind, fields, size, align })));
         let mut bytes = vec![0; size as usize];
         let mut late = Vec::new();
         if let Some(base) = base {
@@ -468,8 +481,12 @@ impl<'a> Compiler<'a> {
                 }
                 return;
             }
-            Progress::Untouched => self.pous[index].state = Progress::Running,
+            Progress::Untouched => {}
         }
+        if !self.deeper(DECLARATION, at) {
+            return;
+        }
+        self.pous[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.pous[index].home);
         let tree = self.pous[index].tree;
         for other in [self.pous[index].base, self.owner_of(index)].into_iter().flatten() {
@@ -491,6 +508,7 @@ impl<'a> Compiler<'a> {
         }
         self.inside.pop();
         self.home = home;
+        self.back(DECLARATION);
         self.pous[index].state = Progress::Done;
     }
 
@@ -582,7 +600,7 @@ impl<'a> Compiler<'a> {
         let (size, align) = layout.end();
         self.too_large(size, Some(tree.name.span));
         let kind = if tree.kind == PouKind::Program { StructKind::Program } else { StructKind::Block };
-        self.types.set(id, Type::Struct(Box::new(Structure { name: tree.name.text.clone(), kind, fields, size, align })));
+        self.types.set(id, Type::Struct(Arc::new(Structure { name: tree.name.text.clone(), kind, fields, size, align })));
         let mut bytes = vec![0; size as usize];
         let mut late = Vec::new();
         if let Some(base) = base {
@@ -627,8 +645,12 @@ impl<'a> Compiler<'a> {
                 self.depends_on_itself(&decl.name);
                 return;
             }
-            Progress::Untouched => self.globals[index].state = Progress::Running,
+            Progress::Untouched => {}
         }
+        if !self.deeper(DECLARATION, decl.name.span) {
+            return;
+        }
+        self.globals[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.globals[index].home);
         self.inside.push((&decl.name, decl.name.span));
         let ty = self.variable_type(decl, None);
@@ -637,6 +659,7 @@ impl<'a> Compiler<'a> {
         let value = if constant && decl.init.is_some() { self.constant_of(decl, ty, None) } else { None };
         self.inside.pop();
         self.home = home;
+        self.back(DECLARATION);
         self.globals[index].var = Some(Variable {
             name: decl.name.text.clone(),
             kind: self.globals[index].kind,
@@ -652,26 +675,33 @@ impl<'a> Compiler<'a> {
     }
 
     /// The nearest known name, as help.
-    pub(crate) fn suggest(&self, name: &str, types_only: bool) -> Option<String> {
+    pub(crate) fn suggest(&mut self, name: &str, types_only: bool) -> Option<String> {
+        if !self.may_compare(self.names.len() + self.library_names.len()) {
+            return None;
+        }
         let wanted = key(name);
         let usable = |item: &Item| {
             !types_only || matches!(item, Item::Type(_) | Item::Ready(_) | Item::NativeBlock(_) | Item::Pou(_) | Item::Interface(_))
         };
-        let elementary = ELEMENTARY.iter().map(|(n, _)| *n).chain(["STRING", "WSTRING"]).filter(|_| types_only).map(String::from);
-        let known = self.names.iter().chain(&self.library_names).filter(|(_, i)| usable(i)).map(|(n, _)| n.clone());
+        let elementary = ELEMENTARY.iter().map(|(n, _)| *n).chain(["STRING", "WSTRING"]).filter(|_| types_only);
+        let known = self.names.iter().chain(&self.library_names).filter(|(_, i)| usable(i)).map(|(n, _)| n.as_str());
         nearest(&wanted, known.chain(elementary)).map(|n| format!("did you mean `{n}`?"))
     }
 }
 
 /// The candidate with the smallest edit distance, if it is near; ties by name.
-pub(crate) fn nearest(wanted: &str, known: impl Iterator<Item = String>) -> Option<String> {
-    let length = wanted.chars().count();
-    let limit = (1 + length / 4).min(length.saturating_sub(1));
-    known.filter_map(|n| Some((distance(wanted, &n, limit)?, n))).min().map(|(_, n)| n)
+pub(crate) fn nearest<N: AsRef<str> + Ord>(wanted: &str, known: impl Iterator<Item = N>) -> Option<N> {
+    let wanted: Vec<char> = wanted.chars().collect();
+    let limit = (1 + wanted.len() / 4).min(wanted.len().saturating_sub(1));
+    known.filter_map(|n| Some((distance(&wanted, n.as_ref(), limit)?, n))).min().map(|(_, n)| n)
 }
 
-fn distance(a: &str, b: &str, limit: usize) -> Option<usize> {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+fn distance(a: &[char], b: &str, limit: usize) -> Option<usize> {
+    // A letter has one to four bytes.
+    if b.len() + limit < a.len() || b.len() > (a.len() + limit) * 4 {
+        return None;
+    }
+    let b: Vec<char> = b.chars().collect();
     if a.len().abs_diff(b.len()) > limit {
         return None;
     }

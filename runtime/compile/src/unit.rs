@@ -37,6 +37,7 @@ pub(crate) struct Compiler<'a> {
     pub(crate) declared: Vec<Declared<'a>>,
     pub(crate) globals: Vec<GlobalVar<'a>>,
     pub(crate) lists: Vec<List>,
+    pub(crate) list_names: HashMap<String, usize>,
     pub(crate) interfaces: Vec<Interface<'a>>,
     pub(crate) interface_of_type: HashMap<TypeId, usize>,
     /// EXTENDS of blocks and IMPLEMENTS as written, until they are linked.
@@ -75,6 +76,10 @@ pub(crate) struct Compiler<'a> {
     pub(crate) natives: HashMap<&'static str, NativeId>,
     pub(crate) sites: Sites,
     pub(crate) queue: Vec<(BodyId, Job)>,
+    /// How deep declarations and expressions that need each other are nested, see [`Compiler::deeper`].
+    pub(crate) depth: u32,
+    /// Names that may still be compared in search of what was meant.
+    pub(crate) comparisons: usize,
     /// Next free byte of the image.
     pub(crate) next: u64,
     /// Statements that set what cannot be bytes, with the unit whose names they use.
@@ -99,6 +104,7 @@ impl<'a> Compiler<'a> {
             declared: Vec::new(),
             globals: Vec::new(),
             lists: Vec::new(),
+            list_names: HashMap::new(),
             interfaces: Vec::new(),
             interface_of_type: HashMap::new(),
             extends: Vec::new(),
@@ -122,6 +128,8 @@ impl<'a> Compiler<'a> {
             natives: HashMap::new(),
             sites: Sites::new(files),
             queue: Vec::new(),
+            depth: 0,
+            comparisons: crate::limits::COMPARISONS,
             next: takt_ir::NULL_ZONE.into(),
             late: Vec::new(),
         }

@@ -383,6 +383,7 @@ fn wide(text: &str) -> Option<Vec<u16>> {
 mod tests {
     use super::*;
     use crate::value::{Scalar, format_value, read_scalar};
+    use std::sync::Arc;
 
     fn types() -> (Types, Vec<TypeId>) {
         use Elem::*;
@@ -393,7 +394,7 @@ mod tests {
         ];
         let mut ids: Vec<TypeId> = elems.into_iter().map(|e| types.intern(Type::Elem(e))).collect();
         let members = vec![("idle".into(), 0), ("positive".into(), 1), ("Back".into(), -1)];
-        ids.push(types.intern(Type::Enum(Box::new(Enumeration { name: "WAY".into(), base: Int, members }))));
+        ids.push(types.intern(Type::Enum(Arc::new(Enumeration { name: "WAY".into(), base: Int, members }))));
         ids.push(types.intern(Type::Subrange { base: Int, low: -5, high: 5 }));
         ids.push(types.intern(Type::String(5)));
         ids.push(types.intern(Type::WString(3)));

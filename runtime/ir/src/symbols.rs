@@ -277,6 +277,7 @@ impl Walk<'_> {
 mod tests {
     use super::*;
     use crate::types::{Field, StructKind, Structure};
+    use std::sync::Arc;
     use takt_abi::Elem;
 
     fn program() -> Program {
@@ -288,7 +289,7 @@ mod tests {
         let [int, lreal] = [Elem::Int, Elem::Lreal].map(|e| types.intern(Type::Elem(e)));
         let field = |name: &str, ty, offset, section| Field { name: name.into(), ty, offset, section, doc: String::new() };
         let mut structure = |name: &str, fields, size| {
-            types.intern(Type::Struct(Box::new(Structure { name: name.into(), kind: StructKind::Block, fields, size, align: 8 })))
+            types.intern(Type::Struct(Arc::new(Structure { name: name.into(), kind: StructKind::Block, fields, size, align: 8 })))
         };
         let axis = structure(
             "AXIS",

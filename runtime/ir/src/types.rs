@@ -1,5 +1,6 @@
 //! Types with their layout: what compiler, symbols and tools know of a variable.
 
+use std::sync::Arc;
 use takt_abi::{Elem, Section};
 
 /// A type of a program. Equal structural types have equal ids.
@@ -84,9 +85,9 @@ pub enum Type {
         dims: u32,
     },
     /// STRUCT, UNION, FUNCTION_BLOCK, PROGRAM. Identity is the name within a program.
-    Struct(Box<Structure>),
+    Struct(Arc<Structure>),
     /// Enumeration.
-    Enum(Box<Enumeration>),
+    Enum(Arc<Enumeration>),
     /// POINTER TO: 8 bytes, an offset into the image.
     Pointer(TypeId),
     /// REFERENCE TO.

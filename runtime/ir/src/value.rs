@@ -285,6 +285,7 @@ fn put_wstring(units: &[u16], out: &mut String) {
 mod tests {
     use super::*;
     use crate::types::{Field, StructKind, Structure};
+    use std::sync::Arc;
 
     #[test]
     fn arrays_and_structures_show_as_initial_values() {
@@ -295,7 +296,7 @@ mod tests {
         let field = |name: &str, ty, offset, section| Field { name: name.into(), ty, offset, section, doc: String::new() };
         let fields = vec![field("x", int, 0, Section::State), field("p", pointer, 8, Section::Input), field("io", int, 16, Section::InOut)];
         let structure =
-            types.intern(Type::Struct(Box::new(Structure { name: "S".into(), kind: StructKind::Struct, fields, size: 24, align: 8 })));
+            types.intern(Type::Struct(Arc::new(Structure { name: "S".into(), kind: StructKind::Struct, fields, size: 24, align: 8 })));
         let bytes: Vec<u8> = [1i16, 2, 2, 0, 0, 0, 0, 5].iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(format_value(&types, array, &bytes), "[1, 2, 2, 4(0), 5]");
         assert_eq!(format_value(&types, array, &bytes[..4]), "[1, 2?]");

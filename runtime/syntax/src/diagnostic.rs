@@ -81,7 +81,7 @@ codes! {
     E0103 UnterminatedString "a string is not closed on its line",
     E0104 BadLiteral "a literal is malformed or too large for any type",
     E0105 UnexpectedToken "another word or sign was expected here",
-    E0106 TooDeep "brackets or statements are nested too deeply",
+    E0106 TooDeep "brackets, statements or declarations are nested too deeply",
     E0107 MissingEnd "a block is not closed by its END_",
     E0108 NotSupported "a construct that this version does not support",
     E0109 ErrorPragma "the program says `{error}` itself",

@@ -162,10 +162,10 @@ impl Lowering<'_, '_> {
         let word = self.exact_value(&a);
         let site = self.site(span);
         let mut choices = Vec::new();
-        for (name, value) in e.members {
-            let text = name.into_bytes();
+        for (name, value) in &e.members {
+            let text = name.clone().into_bytes();
             let ty = self.c.types.intern(Type::String(text.len() as u32));
-            let number = self.b.int(value);
+            let number = self.b.int(*value);
             let hit = self.b.op(Op::Eq, &[word, number], site);
             choices.push((hit, self.constant(crate::constant::Value::Text(text), ty, span)));
         }

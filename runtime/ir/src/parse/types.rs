@@ -4,6 +4,7 @@ use super::ParseError;
 use super::cursor::Cursor;
 use crate::print::types::{KINDS, SECTIONS, kind_name, section_name};
 use crate::types::{Enumeration, Field, StructKind, Structure, Type, TypeId, elem_name};
+use std::sync::Arc;
 use takt_abi::Elem;
 
 pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Type, ParseError> {
@@ -12,7 +13,7 @@ pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Type, ParseError> {
         return Ok(Type::Elem(elem));
     }
     if let Some(kind) = KINDS.into_iter().find(|k| kind_name(*k) == word) {
-        return structure(cursor, kind).map(|s| Type::Struct(Box::new(s)));
+        return structure(cursor, kind).map(|s| Type::Struct(Arc::new(s)));
     }
     Ok(match word {
         "string" => Type::String(cursor.number()?),
@@ -26,7 +27,7 @@ pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Type, ParseError> {
         "enum" => {
             let (name, base) = (cursor.text()?, elem(cursor)?);
             cursor.expect("{")?;
-            Type::Enum(Box::new(Enumeration { name, base, members: cursor.list("}", member)? }))
+            Type::Enum(Arc::new(Enumeration { name, base, members: cursor.list("}", member)? }))
         }
         "pointer" => Type::Pointer(TypeId(cursor.number()?)),
         "interface" => Type::Interface(cursor.text()?.into()),
