@@ -44,6 +44,27 @@ const OPERATOR_FUNCTIONS: &[(&str, BinaryOp)] = &[
     ("NE", BinaryOp::Ne),
 ];
 
+/// The rest of them, without the conversions.
+const OTHERS: &[&str] = &[
+    "ABS",
+    "EXPT",
+    "MIN",
+    "MAX",
+    "LIMIT",
+    "SEL",
+    "MUX",
+    "MOVE",
+    "NOT",
+    "SHL",
+    "SHR",
+    "ROL",
+    "ROR",
+    "ATAN2",
+    "TRUNC",
+    "TRUNC_INT",
+    "ROUND",
+];
+
 /// Names of the parameters, where arguments may be named.
 fn parameters(name: &str) -> &'static [&'static str] {
     match name {
@@ -69,7 +90,7 @@ impl<'a> Lowering<'_, 'a> {
         let known = self.is_intrinsic(&upper);
         if !known {
             self.check_arguments(args);
-            let help = self.c.suggest(name, false);
+            let help = near_function(&upper).or_else(|| self.c.suggest(name, false));
             self.report(Code::UnknownName, at, format!("there is no function `{name}`")).help = help;
             return self.error(span);
         }
@@ -78,25 +99,6 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     fn is_intrinsic(&self, name: &str) -> bool {
-        const OTHERS: &[&str] = &[
-            "ABS",
-            "EXPT",
-            "MIN",
-            "MAX",
-            "LIMIT",
-            "SEL",
-            "MUX",
-            "MOVE",
-            "NOT",
-            "SHL",
-            "SHR",
-            "ROL",
-            "ROR",
-            "ATAN2",
-            "TRUNC",
-            "TRUNC_INT",
-            "ROUND",
-        ];
         OTHERS.contains(&name)
             || REAL_FUNCTIONS.iter().any(|(n, ..)| *n == name)
             || OPERATOR_FUNCTIONS.iter().any(|(n, _)| *n == name)
@@ -593,6 +595,13 @@ impl<'a> Lowering<'_, 'a> {
             }
         }
     }
+}
+
+/// The overloaded function that may have been meant, as help.
+fn near_function(name: &str) -> Option<String> {
+    let real = REAL_FUNCTIONS.iter().map(|(n, ..)| *n);
+    let all = real.chain(OPERATOR_FUNCTIONS.iter().map(|(n, _)| *n)).chain(OTHERS.iter().copied());
+    crate::types::nearest(name, all.map(String::from)).map(|n| format!("did you mean `{n}`?"))
 }
 
 /// How many arguments a function takes: least and most.
