@@ -8,7 +8,11 @@ use std::process::{Command, Output};
 fn folder(test: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("takt-cli-{test}-{}", std::process::id()));
     std::fs::create_dir_all(folder.join("bad/src")).unwrap();
-    std::fs::write(folder.join("good.st"), "PROGRAM p VAR x : INT; r : LREAL; t : TIME := T#5s; END_VAR x := x + 1; r := 2.0 * r; t := t + T#0s; END_PROGRAM").unwrap();
+    std::fs::write(
+        folder.join("good.st"),
+        "PROGRAM p VAR x : INT; r : LREAL; t : TIME := T#5s; END_VAR x := x + 1; r := 2.0 * r; t := t + T#0s; END_PROGRAM",
+    )
+    .unwrap();
     std::fs::write(folder.join("wrong.st"), "PROGRAM p VAR x : INT; END_VAR\nx := 'text';\ny := 1;\nEND_PROGRAM").unwrap();
     std::fs::write(folder.join("fault.st"), "PROGRAM p VAR x, y : INT; END_VAR\nx := x / y;\nEND_PROGRAM").unwrap();
     std::fs::write(folder.join("bad/takt.toml"), "[project]\nstrct = true\n").unwrap();
