@@ -32,7 +32,8 @@ pub fn found(output: &Output) -> Vec<Expected> {
         .iter()
         .map(|d| {
             let (line, column) = place(d);
-            Expected { line, column, code: d.code.text().into(), text: d.message.clone() }
+            let help = d.help.as_ref().map_or_else(String::new, |help| format!(" ({help})"));
+            Expected { line, column, code: d.code.text().into(), text: d.message.clone() + &help }
         })
         .collect();
     all.sort_by_key(|e| (e.line, e.column));

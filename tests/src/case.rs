@@ -1,7 +1,7 @@
 //! Cases as they stand in `tests/suite`: a program and what must be true of it.
 //!
-//! `--- name check ---`: every line `// ^ CODE text` says that the line above it has a message with that code at the caret's column, whose text
-//! contains `text` (`// <- CODE text`: at column 1); there must be no other message. `--- name lint ---` is the same with warnings of likely mistakes. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
+//! `--- name check ---`: every line `// ^ CODE text` says that the line above it has a message with that code at the caret's column, whose text,
+//! with the help in brackets behind it, contains `text` (`// <- CODE text`: at column 1); there must be no other message. `--- name lint ---` is the same with warnings of likely mistakes. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
 //! expects (`_` does not), `every 10ms` is the step, `fault NAME at LINE:COL` expects the run to end so, `stack BODY:LINE …` its callers.
 //! `--- name ir ---`: a program in the text form of the IR, for what ST cannot reach; the waveform stands behind `;|`, and `refused TEXT` says that the
 //! verifier must not let it pass.

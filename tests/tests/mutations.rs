@@ -133,7 +133,7 @@ fn no_mutation_of_a_program_panics_hangs_or_passes_unverified() {
         let mut random = Random(seed as u64);
         let text = mutate(&texts[random.below(texts.len())], &mut random);
         let start = Instant::now();
-        let result = std::panic::catch_unwind(|| bench::compile(&text));
+        let result = std::panic::catch_unwind(|| bench::compile_with(&text, &takt_compile::Options { lint: true, ..Default::default() }));
         let Ok(output) = result else { panic!("seed {seed} panics:\n{text}") };
         assert!(start.elapsed() < Duration::from_secs(20), "seed {seed} takes too long:\n{text}");
         if let Some(program) = output.program {

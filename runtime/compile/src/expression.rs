@@ -568,7 +568,9 @@ impl<'c, 'a> Lowering<'c, 'a> {
         let Type::Enum(e) = self.c.types.get(ty) else {
             let name = self.type_name(ty);
             if *self.c.types.get(ty) != Type::Error {
-                self.report(Code::UnknownMember, member.span, format!("the type `{name}` has no member `{}`", member.text));
+                let help = matches!(self.c.types.get(ty), Type::Struct(_) | Type::Interface(_))
+                    .then(|| format!("`{name}` is a type; declare a variable of it, and write that before the dot"));
+                self.report(Code::UnknownMember, member.span, format!("the type `{name}` has no member `{}`", member.text)).help = help;
             }
             return Thing::Error;
         };

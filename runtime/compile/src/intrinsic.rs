@@ -106,7 +106,7 @@ impl<'a> Lowering<'_, 'a> {
         }
         if !is_intrinsic(&upper) {
             self.check_arguments(args);
-            let help = self.c.suggest(name, false);
+            let help = near_function(&upper).or_else(|| self.c.suggest(name, false));
             self.report(Code::UnknownName, at, format!("there is no function `{name}`")).help = help;
             return self.error(span);
         }
@@ -240,4 +240,11 @@ fn is_intrinsic(name: &str) -> bool {
         || Decimal::find(name).is_some()
         || number::truncation(name).is_some()
         || time::find(name).is_some()
+}
+
+/// The overloaded function that may have been meant, as help.
+fn near_function(name: &str) -> Option<String> {
+    let real = REAL_FUNCTIONS.iter().map(|(n, ..)| *n);
+    let all = real.chain(OPERATOR_FUNCTIONS.iter().map(|(n, _)| *n)).chain(OTHERS.iter().copied());
+    crate::types::nearest(name, all).map(|n| format!("did you mean `{n}`?"))
 }

@@ -10,7 +10,7 @@ mod tasks;
 mod typed;
 mod uses;
 
-use crate::scope::{Member, Owner, key};
+use crate::scope::{Member, Owner};
 use crate::unit::Compiler;
 use std::collections::{HashMap, HashSet};
 use takt_syntax::{Code, Diagnostic, Severity, Span};
@@ -51,7 +51,7 @@ impl<'a> Compiler<'a> {
     }
 
     fn known_names(&self) -> Known {
-        let mut spelled = HashSet::new();
+        let mut members = HashSet::new();
         let mut seen_by: HashMap<usize, Vec<usize>> = HashMap::new();
         let mut uses = Vec::with_capacity(self.pous.len());
         for (unit, pou) in self.pous.iter().enumerate() {
@@ -61,15 +61,15 @@ impl<'a> Compiler<'a> {
             }
             let mut found = names::Names::default();
             found.unit(&pou.tree);
-            spelled.extend(found.members);
-            uses.push(names::folded(found.names));
+            let found = names::folded(found.names);
+            members.extend(found.iter().filter(|(_, how)| *how & names::MEMBER != 0).map(|(name, _)| name.clone()));
+            uses.push(found);
             let own = if let Some(Owner::Pou(owner)) = pou.owner { owner } else { unit };
             self.bases(own).for_each(|base| seen_by.entry(base).or_default().push(unit));
             if own != unit {
                 seen_by.entry(unit).or_default().push(unit);
             }
         }
-        let members = spelled.into_iter().map(key).collect();
         Known { uses, members, properties: self.property_names(), seen_by }
     }
 

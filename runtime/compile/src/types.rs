@@ -685,7 +685,21 @@ impl<'a> Compiler<'a> {
         };
         let elementary = ELEMENTARY.iter().map(|(n, _)| *n).chain(["STRING", "WSTRING"]).filter(|_| types_only);
         let known = self.names.iter().chain(&self.library_names).filter(|(_, i)| usable(i)).map(|(n, _)| n.as_str());
-        nearest(&wanted, known.chain(elementary)).map(|n| format!("did you mean `{n}`?"))
+        nearest(&wanted, known.chain(elementary)).map(|n| format!("did you mean `{}`?", self.spelling(n)))
+    }
+
+    /// A name as it is declared.
+    fn spelling<'n>(&'n self, name: &'n str) -> &'n str {
+        let declared = match self.names.get(name).or_else(|| self.library_names.get(name)) {
+            Some(Item::Pou(i)) => &self.pous[*i].tree.name.text,
+            Some(Item::Type(i)) => &self.declared[*i].tree.name.text,
+            Some(Item::Interface(i)) => &self.interfaces[*i].tree.name.text,
+            Some(Item::Global(i)) => &self.globals[*i].decl.name.text,
+            Some(Item::List(i)) => &self.lists[*i].name,
+            _ => name,
+        };
+        // An alias is what was asked for, not what it stands for.
+        if key(declared) == name { declared } else { name }
     }
 }
 
@@ -705,17 +719,22 @@ fn distance(a: &[char], b: &str, limit: usize) -> Option<usize> {
     if a.len().abs_diff(b.len()) > limit {
         return None;
     }
+    let mut before: Vec<usize> = Vec::new();
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
+        let mut next = vec![i + 1];
         for (j, y) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+            let replaced = row[j] + usize::from(x != y);
+            let mut least = replaced.min(row[j + 1] + 1).min(next[j] + 1);
+            // Two letters in the other order are one slip.
+            if i > 0 && j > 0 && *x == b[j - 1] && a[i - 1] == *y {
+                least = least.min(before[j - 1] + 1);
+            }
+            next.push(least);
         }
+        before = std::mem::replace(&mut row, next);
     }
-    Some(row[b.len()]).filter(|d| *d <= limit)
+    row.last().copied().filter(|d| *d <= limit)
 }
 
 /// Offsets as `repr(C)` gives them.

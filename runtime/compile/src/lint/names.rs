@@ -1,7 +1,7 @@
 //! The names that stand in a unit, and what is done with them.
 
 use crate::scope::{Head, key};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use takt_syntax::tree::{
     Arg, ArgKind, AssignOp, CaseLabel, Expr, ExprKind, Init, InitItem, Stmt, StmtKind, TypeExpr, TypeExprKind, VarDecl,
 };
@@ -16,14 +16,14 @@ pub(super) const PART: u8 = 4;
 pub(super) const GIVEN: u8 = 8;
 /// It is called.
 pub(super) const CALLED: u8 = 16;
+/// It stands behind a dot, or before an argument: somebody else's variable has this name. No use by itself.
+pub(super) const MEMBER: u8 = 32;
 
 /// What a walk through a unit finds, as it is spelled.
 #[derive(Debug, Default)]
 pub(super) struct Names<'a> {
     /// What is done with a name.
     pub(super) names: HashMap<&'a str, u8>,
-    /// Names that stand behind a dot, and those of arguments.
-    pub(super) members: HashSet<&'a str>,
 }
 
 /// The same by key.
@@ -174,8 +174,7 @@ impl<'a> Names<'a> {
 
     /// A name behind a dot; it may be a constant that numbers a bit.
     fn member(&mut self, name: &'a str) {
-        self.members.insert(name);
-        self.mark(name, READ);
+        self.mark(name, READ | MEMBER);
     }
 
     /// What may be changed by whoever gets it, if it is a variable.
@@ -187,7 +186,7 @@ impl<'a> Names<'a> {
     }
 
     fn argument(&mut self, arg: &'a Arg) {
-        self.members.extend(arg.name.iter().map(|name| name.text.as_str()));
+        arg.name.iter().for_each(|name| self.mark(&name.text, MEMBER));
         match (&arg.value, arg.kind) {
             (Some(value), ArgKind::Out | ArgKind::NotOut) => self.target(value, WRITTEN),
             (Some(value), _) => self.given(value),
@@ -198,7 +197,7 @@ impl<'a> Names<'a> {
     fn read(&mut self, e: &'a Expr) {
         match &e.kind {
             ExprKind::Name(name) => self.mark(name, READ),
-            ExprKind::Global(name) => self.members.extend([name.text.as_str()]),
+            ExprKind::Global(name) => self.mark(&name.text, MEMBER),
             ExprKind::Member(base, member) => {
                 self.member(&member.text);
                 self.read(base);

@@ -161,16 +161,19 @@ fn reached(program: &Program, graph: &CallGraph, entry: usize) -> Vec<usize> {
     found
 }
 
-/// The effects of all bodies; repeated until those behind parameters are known through every row of calls.
+/// The effects of the bodies that tasks reach; what is called comes first, so that only cycles of calls need a second pass.
 fn all_effects(program: &Program) -> Vec<Effects> {
     let mut effects = vec![Effects::default(); program.bodies.len()];
+    let order = callees_first(program);
+    let cyclic = order.iter().any(|body| program.bodies[*body].recursive);
     loop {
         let mut changed = false;
-        for (i, body) in program.bodies.iter().enumerate() {
-            let found = Walk { body, all: &effects, targets: HashMap::new(), found: effects[i].clone() }.run();
-            if found != effects[i] {
-                (effects[i], changed) = (found, true);
-            }
+        for i in &order {
+            let body = &program.bodies[*i];
+            let walk = Walk { body, all: &effects, targets: vec![None; body.locals.len()], found: Effects::default() };
+            let found = walk.run();
+            changed |= cyclic && found.params != effects[*i].params;
+            effects[*i] = found;
         }
         if !changed {
             return effects;
@@ -178,10 +181,31 @@ fn all_effects(program: &Program) -> Vec<Effects> {
     }
 }
 
+/// The bodies that tasks reach, each behind those it calls (but for cycles).
+fn callees_first(program: &Program) -> Vec<usize> {
+    let graph = CallGraph::new(program);
+    let mut seen = vec![false; graph.nodes()];
+    let mut order = Vec::new();
+    for task in &program.tasks {
+        let mut open = vec![(task.entry.0 as usize, false)];
+        while let Some((node, done)) = open.pop() {
+            if done {
+                // Behind the bodies stand the methods that are found by class.
+                order.extend(Some(node).filter(|node| *node < program.bodies.len()));
+            } else if !std::mem::replace(&mut seen[node], true) {
+                open.push((node, true));
+                open.extend(graph.calls(node).iter().filter(|callee| !seen[**callee]).map(|callee| (*callee, false)));
+            }
+        }
+    }
+    order
+}
+
 struct Walk<'p> {
     body: &'p Body,
     all: &'p [Effects],
-    targets: HashMap<Local, Target>,
+    /// Per local, where it points.
+    targets: Vec<Option<Target>>,
     found: Effects,
 }
 
@@ -189,7 +213,7 @@ impl Walk<'_> {
     fn run(mut self) -> Effects {
         for param in 0..self.body.params {
             if let Some(Ty::Addr(_)) = self.body.locals.get(param as usize) {
-                self.targets.insert(Local(param), Target::Param(param));
+                self.set(Local(param), Some(Target::Param(param)));
             }
         }
         let body = self.body;
@@ -201,7 +225,7 @@ impl Walk<'_> {
         match inst {
             Inst::Load { dst, mem, base, offset } => {
                 self.access(*base, *offset, mem.size(), true, false);
-                self.targets.remove(dst);
+                self.set(*dst, None);
             }
             Inst::Store { mem, base, offset, .. } => self.access(*base, *offset, mem.size(), false, true),
             Inst::Data { dst, offset, len, .. } => self.access(*dst, *offset, *len, false, true),
@@ -220,12 +244,19 @@ impl Walk<'_> {
             Inst::Call { body, args, .. } => self.call(body.0 as usize, args),
             Inst::Native { args, .. } => args.iter().for_each(|arg| self.touch(*arg, (true, true))),
             Inst::Virtual { this, args, .. } => std::iter::once(this).chain(args).for_each(|arg| self.touch(*arg, (true, true))),
-            Inst::Copy { dst, src } => match self.targets.get(src).copied() {
-                Some(target) => drop(self.targets.insert(*dst, target)),
-                None => drop(self.targets.remove(dst)),
-            },
-            Inst::Const { dst, .. } | Inst::Op { dst, .. } | Inst::Deref { dst, .. } => drop(self.targets.remove(dst)),
+            Inst::Copy { dst, src } => self.set(*dst, self.get(*src)),
+            Inst::Const { dst, .. } | Inst::Op { dst, .. } | Inst::Deref { dst, .. } => self.set(*dst, None),
             _ => {}
+        }
+    }
+
+    fn get(&self, local: Local) -> Option<Target> {
+        self.targets.get(local.0 as usize).copied().flatten()
+    }
+
+    fn set(&mut self, local: Local, target: Option<Target>) {
+        if let Some(known) = self.targets.get_mut(local.0 as usize) {
+            *known = target;
         }
     }
 
@@ -240,7 +271,7 @@ impl Walk<'_> {
         match base {
             Base::Image => Some(Target::Image((offset, offset.saturating_add(len)))),
             Base::Frame => None,
-            Base::Local(local) => match *self.targets.get(&local)? {
+            Base::Local(local) => match self.get(local)? {
                 // An element may be any: all of the array is meant.
                 Target::Image((start, end)) if end - start > self.extent(local) => Some(Target::Image((start, end))),
                 Target::Image((start, _)) => {
@@ -253,10 +284,7 @@ impl Walk<'_> {
     }
 
     fn point(&mut self, dst: Local, base: Base, offset: u32, len: u32) {
-        match self.target(base, offset, len) {
-            Some(target) => drop(self.targets.insert(dst, target)),
-            None => drop(self.targets.remove(&dst)),
-        }
+        self.set(dst, self.target(base, offset, len));
     }
 
     fn access(&mut self, base: Base, offset: u32, len: u32, reads: bool, writes: bool) {
@@ -266,7 +294,7 @@ impl Walk<'_> {
     }
 
     fn touch(&mut self, arg: Local, how: (bool, bool)) {
-        if let Some(target) = self.targets.get(&arg).copied() {
+        if let Some(target) = self.get(arg) {
             self.note(target, how);
         }
     }

@@ -114,9 +114,9 @@ impl<'a> Lowering<'_, 'a> {
         let quiet = |name: &str, how: u8| {
             let changes = how & (super::names::WRITTEN | super::names::PART | super::names::GIVEN) != 0;
             let calls = how & super::names::CALLED != 0;
-            (!changes || inside(name)) && (!calls || self.c.global_name(name).is_none())
+            how & super::names::MEMBER == 0 && (!changes || inside(name)) && (!calls || self.c.global_name(name).is_none())
         };
-        closed && found.members.is_empty() && found.names.iter().all(|(name, how)| quiet(name, *how))
+        closed && found.names.iter().all(|(name, how)| quiet(name, *how))
     }
 
     /// `p := ADR(x)` where `p` is a pointer to something else.

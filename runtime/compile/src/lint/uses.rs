@@ -1,7 +1,7 @@
 //! Variables that nothing uses, values that nothing reads, results that nothing sets, names that hide others.
 
 use super::Known;
-use super::names::{CALLED, GIVEN, PART, READ, WRITTEN};
+use super::names::{CALLED, GIVEN, MEMBER, PART, READ, WRITTEN};
 use crate::scope::{Item, Owner, PouKind, Variable, key};
 use crate::unit::Compiler;
 use takt_ir::{StructKind, Type, TypeId};
@@ -32,7 +32,7 @@ impl<'a> Compiler<'a> {
             return;
         }
         let units = known.seen_by.get(&pou).map_or(&[][..], Vec::as_slice);
-        let mut how = units.iter().filter_map(|unit| known.uses[*unit].get(wanted)).fold(0, |all, how| all | how);
+        let mut how = units.iter().filter_map(|unit| known.uses[*unit].get(wanted)).fold(0, |all, how| all | how) & !MEMBER;
         // What a call's own variables are called elsewhere does not matter.
         if !self.lives_for_a_call(pou, v) && known.members.contains(wanted) {
             how |= READ;
