@@ -2,9 +2,10 @@
 
 use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand, Thing};
+use crate::place::Place;
 use takt_abi::Elem;
-use takt_ir::Type;
-use takt_syntax::tree::{Arg, Expr, ExprKind};
+use takt_ir::{Inst, Local, Op, Type};
+use takt_syntax::tree::{Arg, ExprKind};
 use takt_syntax::{Code, Span};
 
 impl<'a> Lowering<'_, 'a> {
@@ -54,9 +55,12 @@ impl<'a> Lowering<'_, 'a> {
             return self.error(span);
         };
         let array = self.expr(array);
-        let dimension = self.dimension(dimension);
-        let (Some(d), false) = (dimension, array.is_error()) else { return self.error(span) };
+        let dimension = self.expr(dimension);
         let lower = name == "LOWER_BOUND";
+        if let (false, None) = (array.is_error(), constant_dimension(&dimension)) {
+            return self.bound_at(lower, &array, &dimension, span);
+        }
+        let (Some(d), false) = (constant_dimension(&dimension), array.is_error()) else { return self.error(span) };
         let dint = self.c.elem(Elem::Dint);
         match (self.c.types.get(array.ty), &array.kind) {
             (Type::Array { dims, .. }, _) if d <= dims.len() => {
@@ -75,15 +79,38 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
-    pub(super) fn dimension(&mut self, e: &'a Expr) -> Option<usize> {
-        let operand = self.expr(e);
-        match operand.kind {
-            Kind::Const(Value::Int(d)) if (1..=100).contains(&d) => Some(d as usize),
-            Kind::Error => None,
+    /// The bound of a dimension whose number is only known when the program runs.
+    fn bound_at(&mut self, lower: bool, array: &Operand, dimension: &Operand, span: Span) -> Operand {
+        let usable = self.scalar(dimension.ty).is_some_and(crate::types::is_integer) && !matches!(dimension.kind, Kind::Const(_));
+        let bounds: Vec<Local> = match (self.c.types.get(array.ty).clone(), &array.kind) {
+            _ if dimension.is_error() => return self.error(span),
+            (Type::Array { dims, .. }, _) if usable => dims.iter().map(|(l, h)| self.b.int(if lower { *l } else { *h })).collect(),
+            (_, Kind::Place(Place::Open { bounds, .. })) if usable => bounds.iter().map(|(l, h)| if lower { *l } else { *h }).collect(),
             _ => {
-                self.report(Code::NotConstant, e.span, "the number of a dimension is a constant from 1");
-                None
+                let found = self.operand_name(array);
+                self.report(Code::NotIndexable, dimension.span, format!("{found} has no such dimension: they are numbered from 1"));
+                return self.error(span);
             }
+        };
+        let index = self.value(dimension);
+        let (low, high) = (self.b.int(1), self.b.int(bounds.len() as i64));
+        let site = self.site(dimension.span);
+        self.b.push(Inst::Check { index, low, high, site });
+        let mut bounds = bounds.into_iter();
+        let Some(mut result) = bounds.next() else { return self.error(span) };
+        for (number, bound) in (2..).zip(bounds) {
+            let number = self.b.int(number);
+            let hit = self.b.op(Op::Eq, &[index, number], site);
+            result = self.b.op(Op::Select, &[hit, bound, result], site);
         }
+        let dint = self.c.elem(Elem::Dint);
+        self.temp(result, dint, span)
+    }
+}
+
+fn constant_dimension(operand: &Operand) -> Option<usize> {
+    match operand.kind {
+        Kind::Const(Value::Int(d)) if (1..=100).contains(&d) => Some(d as usize),
+        _ => None,
     }
 }
