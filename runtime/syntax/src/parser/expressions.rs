@@ -241,11 +241,13 @@ impl Parser<'_> {
             return (args, height);
         }
         loop {
+            let named = matches!(self.peek(1).kind, Kind::Assign | Kind::Output);
             if let Some((arg, tall)) = self.argument() {
                 height = height.max(tall);
                 args.push(arg);
             }
-            if !self.eat(Kind::Comma) {
+            // TwinCAT takes a comma behind the last named argument, as it writes it for outputs: `Done => , )`.
+            if !self.eat(Kind::Comma) || named && self.kind() == Kind::RParen {
                 break;
             }
         }
