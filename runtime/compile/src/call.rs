@@ -3,11 +3,11 @@
 use crate::body::Passing;
 use crate::enable::is_enable;
 use crate::expression::{BLOCK_OUTPUT, Kind, Lowering, Operand, Thing};
+use crate::near::nearest;
 use crate::object::{Bound, Target};
 use crate::operator::Class;
 use crate::place::Place;
 use crate::scope::{Item, Owner, PouKind, Variable, key, same};
-use crate::types::nearest;
 use takt_abi::{FnDesc, Section};
 use takt_ir::{Base, Field, Inst, Local, Mem, StructKind, Structure, Ty, Type, TypeId};
 use takt_syntax::tree::{Arg, ArgKind, Expr, ExprKind, VarKind};

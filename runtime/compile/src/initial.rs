@@ -295,7 +295,7 @@ impl<'a> Compiler<'a> {
         };
         for (name, init) in members {
             let Some(field) = structure.fields.iter().find(|f| same(&f.name, &name.text)) else {
-                let near = crate::types::nearest(&key(&name.text), structure.fields.iter().map(|f| key(&f.name)));
+                let near = crate::near::nearest(&key(&name.text), structure.fields.iter().map(|f| key(&f.name)));
                 let near = near.and_then(|n| structure.fields.iter().find(|f| key(&f.name) == n).map(|f| f.name.clone()));
                 self.report(Code::UnknownMember, name.span, format!("`{}` has no member `{}`", structure.name, name.text)).help =
                     near.map(|n| format!("did you mean `{n}`?"));

@@ -246,5 +246,5 @@ fn is_intrinsic(name: &str) -> bool {
 fn near_function(name: &str) -> Option<String> {
     let real = REAL_FUNCTIONS.iter().map(|(n, ..)| *n);
     let all = real.chain(OPERATOR_FUNCTIONS.iter().map(|(n, _)| *n)).chain(OTHERS.iter().copied());
-    crate::types::nearest(name, all).map(|n| format!("did you mean `{n}`?"))
+    crate::near::nearest(name, all).map(|n| format!("did you mean `{n}`?"))
 }
