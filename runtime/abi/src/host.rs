@@ -111,8 +111,9 @@ pub struct Chunk {
 
 /// Implemented by `takt`; also by tests.
 pub trait Host {
-    /// Queues a request; never blocks. `buffer` is given to the host and comes back as [`Chunk::data`], so that nothing is allocated in a scan.
-    fn submit(&mut self, request: Request, buffer: Vec<u8>) -> Result<Ticket, HostError>;
+    /// Queues a request; never blocks. The host takes `buffer` (and leaves an empty one) only with a request that it accepts; it comes back as
+    /// [`Chunk::data`], so that nothing is allocated in a scan.
+    fn submit(&mut self, request: Request, buffer: &mut Vec<u8>) -> Result<Ticket, HostError>;
     /// At the start of a scan: makes finished requests visible to [`Host::take`]. With `wait`, waits for all of them (virtual time).
     fn latch(&mut self, wait: bool);
     /// The completion of a request, once, if it has been latched. On an error the buffer is lost.
@@ -124,7 +125,7 @@ pub trait Host {
 pub struct NoHost;
 
 impl Host for NoHost {
-    fn submit(&mut self, _: Request, _: Vec<u8>) -> Result<Ticket, HostError> {
+    fn submit(&mut self, _: Request, _: &mut Vec<u8>) -> Result<Ticket, HostError> {
         Err(HostError::Absent)
     }
     fn latch(&mut self, _: bool) {}

@@ -37,15 +37,19 @@ pub fn open(root: PathBuf) -> std::io::Result<Files> {
 }
 
 impl Host for Files {
-    fn submit(&mut self, request: Request, buffer: Vec<u8>) -> Result<Ticket, HostError> {
+    fn submit(&mut self, request: Request, buffer: &mut Vec<u8>) -> Result<Ticket, HostError> {
         if self.under_way + self.latched.len() >= UNDER_WAY {
             return Err(HostError::Busy);
         }
         let ticket = Ticket(self.next);
         let jobs = self.jobs.as_ref().ok_or(HostError::Absent)?;
-        jobs.try_send(Job { ticket, request, buffer }).map_err(|error| match error {
-            TrySendError::Full(_) => HostError::Busy,
-            TrySendError::Disconnected(_) => HostError::Absent,
+        jobs.try_send(Job { ticket, request, buffer: std::mem::take(buffer) }).map_err(|error| {
+            let (job, error) = match error {
+                TrySendError::Full(job) => (job, HostError::Busy),
+                TrySendError::Disconnected(job) => (job, HostError::Absent),
+            };
+            *buffer = job.buffer;
+            error
         })?;
         self.next += 1;
         self.under_way += 1;
@@ -84,7 +88,7 @@ mod tests {
     use takt_abi::{CHUNK, Folder, Str};
 
     fn read(files: &mut Files, path: &str, offset: u64) -> Result<Chunk, HostError> {
-        let ticket = files.submit(Request::Read { folder: Folder::Nc, path: Str::new(path), offset }, Vec::new())?;
+        let ticket = files.submit(Request::Read { folder: Folder::Nc, path: Str::new(path), offset }, &mut Vec::new())?;
         assert!(files.take(ticket).is_none(), "nothing is visible before the next scan");
         files.latch(true);
         files.take(ticket).expect("latched")
@@ -140,8 +144,10 @@ mod tests {
         std::fs::write(root.join("nc/a"), "1").unwrap();
         let mut files = open(root.clone()).unwrap();
         let request = Request::Read { folder: Folder::Nc, path: Str::new("a"), offset: 0 };
-        let tickets: Vec<_> = (0..UNDER_WAY).map(|_| files.submit(request.clone(), Vec::new()).unwrap()).collect();
-        assert_eq!(files.submit(request, Vec::new()), Err(HostError::Busy));
+        let tickets: Vec<_> = (0..UNDER_WAY).map(|_| files.submit(request.clone(), &mut Vec::new()).unwrap()).collect();
+        let mut refused = vec![1, 2];
+        assert_eq!(files.submit(request, &mut refused), Err(HostError::Busy));
+        assert_eq!(refused, [1, 2], "what is not accepted is not taken");
         files.latch(true);
         assert!(tickets.into_iter().all(|ticket| files.take(ticket).is_some_and(|result| result.is_ok())));
         drop(files);

@@ -207,10 +207,10 @@ impl NcSource {
         }
         self.watch();
         if self.phase == Phase::Reading && self.awaited.is_none() && self.back.is_none() {
-            let buffer = self.spare.iter_mut().find_map(Option::take).unwrap_or_else(|| Vec::with_capacity(CHUNK));
-            match host.submit(Request::Read { folder: Folder::Nc, path: self.path, offset: self.received }, buffer) {
+            let mut buffer = self.spare.iter_mut().find_map(Option::take).unwrap_or_else(|| Vec::with_capacity(CHUNK));
+            match host.submit(Request::Read { folder: Folder::Nc, path: self.path, offset: self.received }, &mut buffer) {
                 Ok(ticket) => self.awaited = Some(Awaited { ticket, stale: false }),
-                Err(HostError::Busy) => {}
+                Err(HostError::Busy) => self.recycle(buffer),
                 Err(error) => self.fail(Kind::from(error).at(0, 0)),
             }
         }

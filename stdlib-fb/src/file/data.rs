@@ -23,12 +23,29 @@ fn job(env: &mut Env, own: Handle) -> Option<&mut Job> {
     env.resources.get::<Transfer>(own).map(|t| &mut t.0)
 }
 
-fn abandon(cx: &mut Cx<'_>) {
-    if let Some(own) = cx.own()
-        && let Some(job) = job(cx.env, own)
+/// The start of a transfer: all of its bytes are the program's.
+fn within(cx: &mut Cx<'_>, buffer: u64, size: u64) -> Result<Step, Fault> {
+    if size > 0 {
+        let length = usize::try_from(size).map_err(|_| Fault::WildPointer { offset: buffer, size })?;
+        cx.bytes(buffer, length)?;
+    }
+    Ok(Step::Busy)
+}
+
+/// The file, and the resource of the instance. What `ended`, or has no open file, abandons its request.
+fn ready(cx: &mut Cx<'_>, ended: Option<FileError>, handle: Lword) -> Result<(OpenFile, Handle), FileError> {
+    let own = cx.own();
+    let found = match (ended, file(&mut cx.env.resources, handle).copied(), own) {
+        (Some(code), ..) => Err(code),
+        (None, Some(open), Some(own)) => Ok((open, own)),
+        _ => Err(FileError::HANDLE_INVALID),
+    };
+    if found.is_err()
+        && let Some(job) = own.and_then(|own| job(cx.env, own))
     {
         job.abandon();
     }
+    found
 }
 
 file_block! {
@@ -85,21 +102,15 @@ impl Action for FileRead {
     fn begin(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
         (self.moved, self.started) = (0, cx.now.0);
         (self.buffer, self.size) = (self.pBuffer, self.szBuffer);
-        if self.size > 0 {
-            let size = usize::try_from(self.size).map_err(|_| Fault::WildPointer { offset: self.buffer, size: self.size })?;
-            cx.bytes(self.buffer, size)?;
-        }
-        Ok(Step::Busy)
+        within(cx, self.buffer, self.size)
     }
     fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
-        if let Some(code) = ended(self.xAbort, self.udiTimeOut, self.started, cx.now) {
-            abandon(cx);
-            self.xAborted = self.xAbort;
-            return Ok(Step::Over(code));
-        }
-        let (Some(open), Some(own)) = (file(&mut cx.env.resources, self.hFile).copied(), cx.own()) else {
-            abandon(cx);
-            return Ok(Step::Over(FileError::HANDLE_INVALID));
+        let (open, own) = match ready(cx, ended(self.xAbort, self.udiTimeOut, self.started, cx.now), self.hFile) {
+            Ok(found) => found,
+            Err(code) => {
+                self.xAborted = (code == FileError::ABORT).into();
+                return Ok(Step::Over(code));
+            }
         };
         if !open.reads() {
             return Ok(Step::Over(FileError::WRONG_PARAMETER));
@@ -168,21 +179,15 @@ impl Action for FileWrite {
     fn begin(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
         (self.moved, self.started) = (0, cx.now.0);
         (self.buffer, self.size) = (self.pBuffer, self.szSize);
-        if self.size > 0 {
-            let size = usize::try_from(self.size).map_err(|_| Fault::WildPointer { offset: self.buffer, size: self.size })?;
-            cx.bytes(self.buffer, size)?;
-        }
-        Ok(Step::Busy)
+        within(cx, self.buffer, self.size)
     }
     fn step(&mut self, cx: &mut Cx<'_>) -> Result<Step, Fault> {
-        if let Some(code) = ended(self.xAbort, self.udiTimeOut, self.started, cx.now) {
-            abandon(cx);
-            self.xAborted = self.xAbort;
-            return Ok(Step::Over(code));
-        }
-        let (Some(open), Some(own)) = (file(&mut cx.env.resources, self.hFile).copied(), cx.own()) else {
-            abandon(cx);
-            return Ok(Step::Over(FileError::HANDLE_INVALID));
+        let (open, own) = match ready(cx, ended(self.xAbort, self.udiTimeOut, self.started, cx.now), self.hFile) {
+            Ok(found) => found,
+            Err(code) => {
+                self.xAborted = (code == FileError::ABORT).into();
+                return Ok(Step::Over(code));
+            }
         };
         if !open.writes() {
             return Ok(Step::Over(FileError::WRONG_PARAMETER));

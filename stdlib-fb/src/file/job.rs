@@ -43,7 +43,7 @@ impl Job {
             return None;
         }
         let Some(ticket) = self.ticket else {
-            return match host.submit(request(), std::mem::take(&mut self.spare)) {
+            return match host.submit(request(), &mut self.spare) {
                 Ok(ticket) => {
                     self.ticket = Some(ticket);
                     None

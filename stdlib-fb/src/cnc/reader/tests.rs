@@ -59,13 +59,13 @@ impl Files {
 }
 
 impl Host for Files {
-    fn submit(&mut self, request: Request, buffer: Vec<u8>) -> Result<Ticket, HostError> {
+    fn submit(&mut self, request: Request, buffer: &mut Vec<u8>) -> Result<Ticket, HostError> {
         if self.busy > 0 {
             self.busy -= 1;
             return Err(HostError::Busy);
         }
         self.tickets += 1;
-        self.asked.push((Ticket(self.tickets), request, buffer));
+        self.asked.push((Ticket(self.tickets), request, std::mem::take(buffer)));
         Ok(Ticket(self.tickets))
     }
     fn latch(&mut self, _: bool) {

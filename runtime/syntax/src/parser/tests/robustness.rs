@@ -251,18 +251,3 @@ fn a_token_left_out_or_doubled_is_no_cascade() {
     assert!(share(&left_out, 1) >= 95 && share(&left_out, 2) >= 98, "{left_out:?}");
     assert!(share(&replaced, 2) >= 5 * 85, "{replaced:?}");
 }
-
-/// Prints how long a program of 30 000 lines takes. Says something only when built with optimization: `cargo test --release -- --ignored thirty`.
-#[test]
-#[ignore = "a measurement, which asserts nothing"]
-fn thirty_thousand_lines_are_measured() {
-    let text = MACHINE.repeat(340);
-    let best = (0..20).map(|_| {
-        let start = std::time::Instant::now();
-        let tree = parse(FILE, &text);
-        let spent = start.elapsed();
-        drop(tree);
-        spent
-    });
-    eprintln!("{} lines: {:?}", text.lines().count(), best.min());
-}
