@@ -50,7 +50,7 @@ pub enum Fault {
 
 impl Fault {
     /// The stable number, never 0.
-    pub fn code(self) -> u32 {
+    pub const fn code(self) -> u32 {
         match self {
             Self::Index { .. } => 1,
             Self::DivisionByZero => 2,
@@ -67,7 +67,11 @@ impl Fault {
     }
     /// Whether a program may handle it with `__TRY`: what its own data led to, not what stops it from outside.
     pub fn catchable(code: u32) -> bool {
-        matches!(code, 1..=4 | 7 | 9 | 11)
+        Self::from_raw(code, [0; 3]).is_some_and(|fault| match fault {
+            Self::Index { .. } | Self::DivisionByZero | Self::NullPointer | Self::WildPointer { .. } => true,
+            Self::Block { .. } | Self::WrongDelete | Self::NoInstance { .. } => true,
+            Self::StackOverflow { .. } | Self::Watchdog | Self::Panic | Self::Stopped => false,
+        })
     }
     /// The facts as three words, for [`crate::Context`].
     pub fn facts(self) -> [i64; 3] {

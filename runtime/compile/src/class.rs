@@ -15,8 +15,8 @@ pub(crate) struct Methods {
     all: Vec<(Owner, String)>,
 }
 
-/// Methods that the system calls: each block of a chain has its own, and its own parameters.
-const LIFE: [&str; 3] = ["FB_INIT", "FB_REINIT", "FB_EXIT"];
+/// Methods that the system calls: each block of a chain has its own, and its own parameters, and seldom sets its result.
+pub(crate) const LIFE: [&str; 3] = ["FB_INIT", "FB_REINIT", "FB_EXIT"];
 
 /// Which body of a member is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -195,9 +195,7 @@ impl<'a> Compiler<'a> {
     pub(crate) fn is_a(&self, pou: usize, of: Owner) -> bool {
         match of {
             Owner::Pou(base) => self.bases(pou).any(|b| b == base),
-            Owner::Interface(i) => {
-                self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| *own == i || self.interface_is(*own, i)))
-            }
+            Owner::Interface(i) => self.bases(pou).any(|b| self.pous[b].implements.iter().any(|own| self.interface_is(*own, i))),
         }
     }
 

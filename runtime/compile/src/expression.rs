@@ -7,7 +7,7 @@ use crate::place::Place;
 use crate::scope::{Item, Owner, PouKind, Storage};
 use crate::unit::Compiler;
 use takt_abi::{Elem, FnDesc};
-use takt_ir::{Base, BlockId, Body, BodyId, Const, Local, SiteId, Type, TypeId};
+use takt_ir::{BlockId, Body, BodyId, Const, Local, SiteId, Type, TypeId};
 use takt_syntax::tree::{Expr, ExprKind, VarKind};
 use takt_syntax::{Code, Diagnostic, Span};
 
@@ -374,18 +374,11 @@ impl<'c, 'a> Lowering<'c, 'a> {
     }
 
     fn this_thing(&mut self, span: Span) -> Thing {
-        match (self.this, self.block().and_then(|p| self.c.pous[p].ty)) {
-            (Some(this), Some(ty)) => {
-                let place = Place::Memory { base: Base::Local(this), offset: 0 };
-                let pointer = self.pointer_to(&place);
-                let ty = self.c.types.intern(Type::Pointer(ty));
-                Thing::Value(self.exact(pointer, ty, span))
-            }
-            _ => {
-                self.report(Code::BadStatement, span, "THIS is only possible in a FUNCTION_BLOCK");
-                Thing::Error
-            }
-        }
+        let instance = self.this_instance(span);
+        let Kind::Place(place) = &instance.kind else { return Thing::Error };
+        let pointer = self.pointer_to(place);
+        let ty = self.c.types.intern(Type::Pointer(instance.ty));
+        Thing::Value(self.exact(pointer, ty, span))
     }
 
     /// The operand as a local of its type's class. Structures and strings have none.

@@ -49,6 +49,9 @@ const OPERATOR_FUNCTIONS: &[(&str, BinaryOp)] = &[
     ("NE", BinaryOp::Ne),
 ];
 
+/// Those that ask where a variable is or how large, and do not read it.
+const OF_PLACES: &[&str] = &["BITADR", "ADR", "REF", "SIZEOF", "XSIZEOF", "LOWER_BOUND", "UPPER_BOUND"];
+
 /// The others.
 const OTHERS: &[&str] = &["ABS", "EXPT", "MIN", "MAX", "LIMIT", "SEL", "MUX", "MOVE", "NOT", "SHL", "SHR", "ROL", "ROR", "ATAN2", "ROUND"];
 
@@ -97,12 +100,13 @@ impl<'a> Lowering<'_, 'a> {
     /// Calls the overloaded function of that name, or reports that there is none.
     pub(crate) fn intrinsic(&mut self, name: &str, at: Span, args: &'a [Arg], span: Span) -> Operand {
         let upper = key(name);
-        match upper.as_str() {
-            "BITADR" => return self.bit_address(args, span),
-            "ADR" | "REF" => return self.adr(args, span),
-            "SIZEOF" | "XSIZEOF" => return self.size_of(args, span),
-            "LOWER_BOUND" | "UPPER_BOUND" => return self.bound(&upper, args, span),
-            _ => {}
+        if OF_PLACES.contains(&upper.as_str()) {
+            return match upper.as_str() {
+                "BITADR" => self.bit_address(args, span),
+                "ADR" | "REF" => self.adr(args, span),
+                "SIZEOF" | "XSIZEOF" => self.size_of(args, span),
+                _ => self.bound(&upper, args, span),
+            };
         }
         if !is_intrinsic(&upper) {
             self.check_arguments(args);
@@ -228,7 +232,7 @@ impl<'a> Lowering<'_, 'a> {
 
 /// Whether the compiler knows a function of that name (upper case) itself.
 pub(crate) fn is_known(name: &str) -> bool {
-    matches!(name, "ADR" | "REF" | "SIZEOF" | "XSIZEOF" | "LOWER_BOUND" | "UPPER_BOUND") || is_intrinsic(name)
+    OF_PLACES.contains(&name) || is_intrinsic(name)
 }
 
 fn is_intrinsic(name: &str) -> bool {

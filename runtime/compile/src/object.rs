@@ -220,7 +220,7 @@ impl<'a> Lowering<'_, 'a> {
 
     /// A property that is about to be written. One that gives a REFERENCE is read, and what it refers to is written.
     pub(crate) fn property_target(&mut self, bound: Bound, span: Span) -> Operand {
-        let Some((set, ty)) = self.setter(&bound) else {
+        let Some((_, ty)) = self.setter(&bound) else {
             if !bound.is_property() {
                 self.report(Code::NotAssignable, span, "a method or action cannot be assigned");
                 return self.error(span);
@@ -239,7 +239,6 @@ impl<'a> Lowering<'_, 'a> {
             let value = self.get_property(bound, span);
             return self.follow(value);
         }
-        let _ = set;
         let mut operand = self.error(span);
         (operand.ty, operand.kind) = (ty, Kind::Property(Box::new(bound)));
         operand

@@ -1,12 +1,21 @@
 //! `__TRY … __CATCH(code) … __FINALLY … __ENDTRY`.
 
 use crate::expression::{Kind, Lowering, Thing};
+use takt_abi::Fault;
 use takt_ir::{BlockId, Inst, Local, Op, Term, Ty};
 use takt_syntax::tree::{Name, Stmt};
 use takt_syntax::{Code, Span};
 
-/// Numbers of faults ([`takt_abi::Fault::code`]) and what `__SYSTEM.ExceptionCode` calls them.
-const EXCEPTIONS: [(i64, i64); 7] = [(1, 0x101), (2, 0x102), (3, 0x51), (4, 0x51), (7, 0x2000), (9, 0x56), (11, 0x51)];
+/// Faults that a program may handle, and the numbers that `__SYSTEM.ExceptionCode` gives them.
+const EXCEPTIONS: [(Fault, i64); 7] = [
+    (Fault::Index { value: 0, low: 0, high: 0 }, 0x101),
+    (Fault::DivisionByZero, 0x102),
+    (Fault::NullPointer, 0x51),
+    (Fault::WildPointer { offset: 0, size: 0 }, 0x51),
+    (Fault::Block { error: 0 }, 0x2000),
+    (Fault::WrongDelete, 0x56),
+    (Fault::NoInstance { offset: 0 }, 0x51),
+];
 
 impl<'a> Lowering<'_, 'a> {
     pub(crate) fn try_statement(
@@ -78,8 +87,8 @@ impl<'a> Lowering<'_, 'a> {
         };
         let site = self.site(span);
         let mut code = self.b.int(0xFFFF_FFFF);
-        for (number, exception) in EXCEPTIONS {
-            let (number, exception) = (self.b.int(number), self.b.int(exception));
+        for (caught, exception) in EXCEPTIONS {
+            let (number, exception) = (self.b.int(caught.code().into()), self.b.int(exception));
             let hit = self.b.op(Op::Eq, &[fault, number], site);
             code = self.b.op(Op::Select, &[hit, exception, code], site);
         }

@@ -379,14 +379,18 @@ impl<'a, 'f> Lowering<'a, 'f> {
         let mut signature = Signature::new(self.host);
         signature.params.extend(args.iter().map(|arg| AbiParam::new(self.b.func.dfg.value_type(*arg))));
         signature.returns.extend(result.map(AbiParam::new));
-        let known = self.signatures.iter().find(|(known, _)| *known == signature).map(|(_, reference)| *reference);
-        let reference = known.unwrap_or_else(|| {
-            let reference = self.b.import_signature(signature.clone());
-            self.signatures.push((signature, reference));
-            reference
-        });
+        let reference = self.signature_ref(signature);
         let call = self.b.ins().call_indirect(reference, target, args);
         self.b.inst_results(call).first().copied().unwrap_or(target)
+    }
+    /// The signature in this body, imported once.
+    fn signature_ref(&mut self, signature: Signature) -> SigRef {
+        if let Some((_, reference)) = self.signatures.iter().find(|(known, _)| *known == signature) {
+            return *reference;
+        }
+        let reference = self.b.import_signature(signature.clone());
+        self.signatures.push((signature, reference));
+        reference
     }
     fn compare(&mut self, cc: IntCC, a: Value, b: Value) -> Value {
         self.b.ins().icmp(cc, a, b)

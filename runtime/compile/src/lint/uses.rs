@@ -2,14 +2,12 @@
 
 use super::Known;
 use super::names::{CALLED, GIVEN, MEMBER, PART, READ, WRITTEN};
+use crate::class::LIFE;
 use crate::scope::{Item, Owner, PouKind, Variable, key};
 use crate::unit::Compiler;
 use takt_ir::{StructKind, Type, TypeId};
 use takt_syntax::tree::{StmtKind, VarKind};
 use takt_syntax::{Code, Span};
-
-/// Methods whose results the system expects and seldom anybody sets.
-const LIFE: [&str; 3] = ["FB_INIT", "FB_REINIT", "FB_EXIT"];
 
 impl<'a> Compiler<'a> {
     /// Variables of a unit that are its own affair.

@@ -19,8 +19,7 @@ impl Lowering<'_, '_> {
         let target = self.target(method, pointer, site);
         let callee = &self.program.dispatch[method as usize];
         let params: Vec<Ty> = std::iter::once(Ty::Addr(0)).chain(callee.params.iter().copied()).collect();
-        let signature = signature(&params, callee.result);
-        let signature = self.b.import_signature(signature);
+        let signature = self.signature_ref(signature(&params, callee.result));
         let frame = self.next_frame();
         let instance = self.b.ins().iadd(self.image, pointer);
         let mut values = vec![self.ctx, self.image, frame, instance];
