@@ -13,8 +13,9 @@ use takt_tests::generate::{Generated, generate};
 use takt_tests::shrink::shrink;
 use takt_tests::trial::{Start, compiled, interpreted};
 
-/// Programs that are also run without an engine, marked, for the table: one of so many.
+/// Programs that are also run without an engine, marked, for the table: one of so many, and in a long run one of more.
 const MARKED: u64 = 2;
+const MARKED_OF_MANY: u64 = 16;
 
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
@@ -38,9 +39,9 @@ fn count(program: &Arc<Program>, seed: u64, table: &mut Table) -> Result<(), Fin
     }
 }
 
-fn test(generated: &Generated, table: &mut Table) -> Result<Option<Fault>, Finding> {
+fn test(generated: &Generated, marked: u64, table: &mut Table) -> Result<Option<Fault>, Finding> {
     let (program, fault) = examine(generated)?;
-    if generated.seed.is_multiple_of(MARKED) {
+    if generated.seed.is_multiple_of(marked) {
         count(&program, generated.seed, table)?;
     }
     Ok(fault)
@@ -49,13 +50,14 @@ fn test(generated: &Generated, table: &mut Table) -> Result<Option<Fault>, Findi
 /// Takes seeds until there are none left, or three findings.
 fn work(next: &AtomicU64, end: u64, findings: &AtomicU64) -> (Table, Vec<(Generated, Finding)>) {
     let (mut table, mut found) = (Table::default(), Vec::new());
+    let marked = if end - next.load(Ordering::Relaxed) > 10_000 { MARKED_OF_MANY } else { MARKED };
     loop {
         let seed = next.fetch_add(1, Ordering::Relaxed);
         if seed >= end || findings.load(Ordering::Relaxed) >= 3 {
             return (table, found);
         }
         let generated = generate(seed);
-        if let Err(finding) = test(&generated, &mut table) {
+        if let Err(finding) = test(&generated, marked, &mut table) {
             findings.fetch_add(1, Ordering::Relaxed);
             found.push(shrink(&generated, &finding));
         }
