@@ -75,6 +75,9 @@ pub struct RunArgs {
     /// Variables of the trace.
     #[arg(long, value_name = "VAR,…", value_delimiter = ',', requires = "trace")]
     pub record: Vec<String>,
+    /// Where the machine keeps its state. Default: .takt in the project's folder, in real time only.
+    #[arg(long, value_name = "DIR")]
+    pub state: Option<PathBuf>,
     /// One JSON object on standard output.
     #[arg(long)]
     pub json: bool,

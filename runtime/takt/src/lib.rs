@@ -19,5 +19,6 @@ pub mod program;
 pub mod project;
 pub mod sources;
 pub mod spelling;
+pub mod state;
 pub mod trace;
 pub mod values;

@@ -9,7 +9,7 @@ use crate::plot::Recording;
 use crate::project::{self, Project};
 use crate::sources::Sources;
 use crate::trace::{self, Trace};
-use crate::{messages, platform};
+use crate::{messages, platform, state};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -41,6 +41,8 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     tell_encodings(&project.sources);
     let speed = speed(args, &project);
     let mut machine = build(args, &project, speed)?;
+    let real = speed == Speed::Factor(1.0);
+    let _state = state::of_run(&project, args.state.as_deref(), real).map_err(|error| usage(&error.to_string()))?;
     for (variable, value) in &args.set {
         machine.set(variable, value).map_err(|error| usage(&format!("--set {variable}: {error}")))?;
     }
