@@ -7,6 +7,7 @@ use crate::axis::stage::Stage;
 use crate::bus::{IoDriver, IoFault, ProcessImage};
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
+use crate::force::Forces;
 use crate::load::Link;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned, execute};
@@ -17,7 +18,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_abi::{Context, Env, Fault, Resources, Time};
-use takt_ir::{Place, Program};
+use takt_ir::Program;
 
 /// Fuel after which a poll looks whether it shall stop, at the latest.
 const STOP_SLICE: u64 = 1 << 16;
@@ -25,14 +26,6 @@ const STOP_SLICE: u64 = 1 << 16;
 const PREEMPT_SLICE: u64 = 1 << 8;
 /// Preemptions that are recorded.
 const RECORDED: usize = 1 << 16;
-
-/// A value that a variable is held at.
-pub(crate) struct Force {
-    pub place: Place,
-    /// Bits of the first byte that are held.
-    pub mask: u8,
-    pub bytes: Vec<u8>,
-}
 
 /// Everything a running program needs.
 pub(crate) struct Core {
@@ -52,7 +45,7 @@ pub(crate) struct Core {
     pub driver: Box<dyn IoDriver>,
     pub io_fault: Option<IoFault>,
     pub io_faults: u64,
-    pub forces: Vec<Force>,
+    pub forces: Forces,
     pub fuel_limit: u64,
     pub depth_limit: u32,
     pub clock: Clock,
@@ -73,15 +66,6 @@ pub(crate) struct Core {
     pub inner_ns: u64,
     pub inner_time: Time,
     pub scan_started: Time,
-}
-
-/// Writes a value; of its first byte only the bits of `mask`.
-pub(crate) fn put(target: &mut [u8], bytes: &[u8], mask: u8) {
-    let first = target.first().map_or(0, |byte| byte & !mask);
-    target.copy_from_slice(bytes);
-    if let Some(byte) = target.first_mut() {
-        *byte = *byte & mask | first;
-    }
 }
 
 impl Core {
@@ -376,13 +360,7 @@ impl Core {
 
     /// Holds forced variables at their values.
     pub fn apply_forces(&mut self) {
-        let image = self.image.bytes_mut();
-        for force in &self.forces {
-            let start = force.place.offset as usize;
-            if let Some(target) = image.get_mut(start..start + force.bytes.len()) {
-                put(target, &force.bytes, force.mask);
-            }
-        }
+        self.forces.apply(self.image.bytes_mut());
     }
 
     /// Puts the program at its start: initial bytes, resources, initial values, axes.

@@ -2,7 +2,8 @@
 
 use crate::axis::stage::AxisStatus;
 use crate::bus::{IoFault, ProcessImage};
-use crate::core::{Core, Force, put};
+use crate::command::AccessError;
+use crate::core::Core;
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::memory::execute;
@@ -11,34 +12,10 @@ use crate::statistics::TaskStatistics;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_abi::{Fault, Time};
-use takt_ir::{Base, BodyId, Inst, Place, Program, Type};
+use takt_ir::{Base, BodyId, Inst, Place, Program};
 
 /// Fuel of a condition.
 const CONDITION_FUEL: i64 = 100_000;
-
-/// Why a command or a look into the image was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AccessError {
-    /// The place lies outside the image.
-    Outside,
-    /// The value has another size than the variable.
-    Size {
-        /// Bytes of the variable.
-        expected: usize,
-        /// Bytes given.
-        found: usize,
-    },
-}
-
-impl std::fmt::Display for AccessError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Outside => write!(f, "the variable lies outside the program's memory"),
-            Self::Size { expected, found } => write!(f, "the variable has {expected} bytes, the value {found}"),
-        }
-    }
-}
-impl std::error::Error for AccessError {}
 
 /// Stops a scan from another thread or a signal handler: at its next poll it ends with [`Fault::Stopped`].
 #[derive(Debug, Clone)]
@@ -53,7 +30,7 @@ impl StopHandle {
 
 /// A loaded program.
 pub struct Engine {
-    core: Box<Core>,
+    pub(crate) core: Box<Core>,
     /// Copy of the image for conditions that might change it.
     scratch: Vec<u8>,
 }
@@ -211,50 +188,6 @@ impl Engine {
     /// The bytes of a variable (see [`takt_ir::resolve`]), of a bit the byte around it; empty if the place is not of this program.
     pub fn read(&self, place: Place) -> &[u8] {
         self.range(place).map_or(&[], |range| &self.image()[range])
-    }
-
-    /// Writes a variable once; of a bit, the byte around it with that bit is given.
-    pub fn write(&mut self, place: Place, bytes: &[u8]) -> Result<(), AccessError> {
-        let range = self.range(place)?;
-        if range.len() != bytes.len() {
-            return Err(AccessError::Size { expected: range.len(), found: bytes.len() });
-        }
-        let mask = self.mask(place);
-        put(&mut self.core.image.bytes_mut()[range], bytes, mask);
-        Ok(())
-    }
-
-    /// The bits of a variable's first byte.
-    fn mask(&self, place: Place) -> u8 {
-        match self.core.program.types.get(place.ty) {
-            Type::Bit(bit) => 1u8.checked_shl((*bit).into()).unwrap_or(0),
-            _ => u8::MAX,
-        }
-    }
-
-    /// Holds a variable at a value: written before and after the programs of each scan, until [`Engine::unforce`].
-    pub fn force(&mut self, place: Place, bytes: &[u8]) -> Result<(), AccessError> {
-        self.write(place, bytes)?;
-        match self.core.forces.iter_mut().find(|f| f.place == place) {
-            Some(force) => force.bytes.copy_from_slice(bytes),
-            None => {
-                let mask = self.mask(place);
-                self.core.forces.push(Force { place, mask, bytes: bytes.to_vec() });
-            }
-        }
-        Ok(())
-    }
-
-    /// Lets a variable go; false if it was not forced.
-    pub fn unforce(&mut self, place: Place) -> bool {
-        let before = self.core.forces.len();
-        self.core.forces.retain(|f| f.place != place);
-        self.core.forces.len() < before
-    }
-
-    /// The forced variables and their values, in the order they were forced.
-    pub fn forces(&self) -> impl ExactSizeIterator<Item = (Place, &[u8])> {
-        self.core.forces.iter().map(|f| (f.place, f.bytes.as_slice()))
     }
 
     /// Runs a body without parameters in the interpreter and returns its result (a condition: 0 or 1). What it changes in the image is undone.

@@ -13,10 +13,12 @@
 
 mod axis;
 mod bus;
+mod command;
 mod core;
 mod engine;
 mod executor;
 mod fault;
+mod force;
 mod load;
 mod mapping;
 mod memory;
@@ -27,8 +29,10 @@ mod statistics;
 pub use axis::stage::AxisStatus;
 pub use axis::{AxisConfig, AxisLimits, AxisProblem, Encoder, FeedForward, Home, Lag, cia402::DriveState};
 pub use bus::{BusSize, Channel, DriveIn, DriveOut, IoDriver, IoFault, NoBus, ProcessImage, Signal, Wire};
-pub use engine::{AccessError, Engine, StopHandle};
+pub use command::{AccessError, Command, CommandError, writable};
+pub use engine::{Engine, StopHandle};
 pub use fault::{FaultRecord, Frame};
+pub use force::Forced;
 pub use load::{LoadError, WireProblem, load};
 pub use options::{Clock, ExecutorKind, Options, Preemption};
 pub use statistics::{Histogram, TaskStatistics};

@@ -167,7 +167,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         driver,
         io_fault: None,
         io_faults: 0,
-        forces: Vec::new(),
+        forces: crate::force::Forces::default(),
         depth_limit: options.depth_limit,
         fuel_limit: options.fuel_limit.min(i64::MAX as u64 / 2),
         clock: options.clock,

@@ -272,13 +272,14 @@ fn a_force_holds_before_and_after_the_programs() {
             steps(&mut engine, 1);
             assert_eq!((engine.read(bit(OTHER)), engine.read(bit(FLAG))), (&[1][..], &[1][..]));
         }
-        assert_eq!(engine.forces().collect::<Vec<_>>(), [(bit(FLAG), &[1][..])]);
-        assert!(engine.unforce(bit(FLAG)) && !engine.unforce(bit(FLAG)));
+        assert_eq!(engine.forces().map(|f| (f.place, f.bytes, f.before)).collect::<Vec<_>>(), [(bit(FLAG), &[1][..], &[0][..])]);
+        let release = Command::Release { place: bit(FLAG), restore: false };
+        assert_eq!((engine.command(&release), engine.command(&release)), (Ok(()), Err(AccessError::NotForced.into())));
         steps(&mut engine, 1);
         assert_eq!(engine.read(bit(FLAG)), [0]);
-        assert_eq!(engine.write(bit(FLAG), &[1, 2]), Err(AccessError::Size { expected: 1, found: 2 }));
-        assert_eq!(engine.force(bit(4096), &[1]), Err(AccessError::Outside));
-        assert_eq!(engine.force(place(0, 77), &[1]), Err(AccessError::Outside));
+        assert_eq!(engine.write(bit(FLAG), &[1, 2]), Err(AccessError::Size { expected: 1, found: 2 }.into()));
+        assert_eq!(engine.force(bit(4096), &[1]), Err(AccessError::Outside.into()));
+        assert_eq!(engine.force(place(0, 77), &[1]), Err(AccessError::Outside.into()));
         assert_eq!(engine.read(place(4093, 1)), []);
     });
 }
@@ -455,3 +456,4 @@ fn a_fault_in_the_initial_values_is_told_at_loading() {
 }
 
 mod addresses;
+mod commands;

@@ -7,6 +7,7 @@ mod binding;
 mod bus;
 mod error;
 mod operator;
+pub mod variable;
 
 pub use binding::{PlotPlaces, Shown, View};
 pub use bus::Bus;
@@ -20,7 +21,7 @@ use crate::values;
 use operator::Operator;
 use std::sync::Arc;
 use takt_abi::Time;
-use takt_engine::{Clock, Engine, ExecutorKind, FaultRecord, LoadError};
+use takt_engine::{Clock, Command, CommandError, Engine, ExecutorKind, FaultRecord, LoadError};
 use takt_ir::{BodyId, Place, Program, Trigger};
 
 /// Bytes of native stack that the tool's thread keeps for compiled code.
@@ -298,12 +299,11 @@ impl Machine {
 
     /// Writes a variable once, between scans; `value` is an ST literal.
     pub fn set(&mut self, path: &str, value: &str) -> Result<(), VariableError> {
-        let place = self.place(path)?;
-        if binding::is_constant(&self.program, place) {
-            return Err(VariableError::Constant(path.into()));
+        let (place, bytes) = variable::assignment(&self.program, path, value)?;
+        match self.engine.command(&Command::Write { place, bytes }) {
+            Err(CommandError::Access(error)) => Err(VariableError::Access { path: path.into(), error }),
+            _ => Ok(()),
         }
-        let bytes = takt_ir::parse_value(&self.program.types, place.ty, value).map_err(VariableError::Value)?;
-        self.engine.write(place, &bytes).map_err(|_| self.kind(path, place, "another size"))
     }
 }
 

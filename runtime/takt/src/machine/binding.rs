@@ -5,7 +5,7 @@ use super::operator::BoundStep;
 use crate::manifest::{self, Item, Located, ManifestError, ManifestErrors};
 use crate::project::Project;
 use crate::spelling::nearest;
-use takt_engine::{AxisConfig, AxisLimits, Encoder, FeedForward, Signal, Wire};
+use takt_engine::{AxisConfig, AxisLimits, Command, Encoder, FeedForward, Signal, Wire};
 use takt_ir::{Global, Place, Program, Type};
 
 /// A value to be shown.
@@ -67,12 +67,6 @@ pub(super) fn bind(project: &Project, program: &Program, channels: &Channels) ->
         return Err(project.errors(binder.errors));
     }
     Ok(Bound { axes, wires, steps, view: View { live, report, plot } })
-}
-
-/// Whether a place lies in a constant.
-pub(super) fn is_constant(program: &Program, place: Place) -> bool {
-    let inside = |global: &Global| (global.offset..global.offset + program.types.size(global.ty).max(1)).contains(&place.offset);
-    program.globals.iter().any(|global| global.constant && inside(global))
 }
 
 struct Binder<'a> {
@@ -151,7 +145,7 @@ impl Binder<'_> {
     }
 
     fn step(&mut self, step: &manifest::Step) -> BoundStep {
-        let set = step.set.iter().filter_map(|setting| self.setting(setting)).collect();
+        let set: Vec<Command> = step.set.iter().filter_map(|setting| self.setting(setting)).collect();
         let mut inputs = Vec::new();
         for input in &step.inputs {
             let name = &input.name.value;
@@ -164,17 +158,17 @@ impl Binder<'_> {
                 self.error(input.name.span.clone(), format!("the simulated bus has no input `{name}`"), help);
             }
         }
-        BoundStep { after: step.after, set, pulse: step.pulse, inputs }
+        BoundStep { after: step.after, back: set.clone(), set, pulse: step.pulse, inputs }
     }
 
-    fn setting(&mut self, setting: &manifest::Setting) -> Option<(Place, Vec<u8>)> {
+    fn setting(&mut self, setting: &manifest::Setting) -> Option<Command> {
         let place = self.variable(&setting.variable)?;
-        if is_constant(self.program, place) {
-            self.error(setting.variable.span.clone(), format!("`{}` is a constant", setting.variable.value), "only variables can be set");
+        if let Err(error) = takt_engine::writable(self.program, place) {
+            self.error(setting.variable.span.clone(), format!("`{}`: {error}", setting.variable.value), "only variables can be set");
             return None;
         }
         match takt_ir::parse_value(&self.program.types, place.ty, &setting.value.value) {
-            Ok(bytes) => Some((place, bytes)),
+            Ok(bytes) => Some(Command::Write { place, bytes: bytes.into() }),
             Err(error) => {
                 self.error(setting.value.span.clone(), error.to_string(), "");
                 None

@@ -4,7 +4,7 @@ use crate::manifest::ManifestErrors;
 use crate::program::Compiled;
 use std::fmt;
 use takt_abi::Fault;
-use takt_engine::LoadError;
+use takt_engine::{AccessError, LoadError};
 use takt_ir::{SymbolError, ValueError};
 
 /// Why a machine cannot be built.
@@ -57,8 +57,13 @@ pub enum VariableError {
         /// What was asked for.
         expected: &'static str,
     },
-    /// It is a constant.
-    Constant(String),
+    /// It cannot be written from outside.
+    Access {
+        /// The variable.
+        path: String,
+        /// Why.
+        error: AccessError,
+    },
 }
 
 impl fmt::Display for VariableError {
@@ -67,7 +72,7 @@ impl fmt::Display for VariableError {
             Self::Name(error) => write!(f, "{error}"),
             Self::Value(error) => write!(f, "{error}"),
             Self::Kind { path, found, expected } => write!(f, "`{path}` is `{found}`, expected {expected}"),
-            Self::Constant(path) => write!(f, "`{path}` is a constant"),
+            Self::Access { path, error } => write!(f, "`{path}`: {error}"),
         }
     }
 }

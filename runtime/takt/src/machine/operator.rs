@@ -3,16 +3,17 @@
 use super::Watch;
 use super::bus::Bus;
 use takt_abi::{Fault, Time};
-use takt_engine::Engine;
-use takt_ir::Place;
+use takt_engine::{Command, Engine};
 
 /// A step whose names are resolved.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BoundStep {
     /// Wait once the condition holds.
     pub(crate) after: Time,
-    /// Places and bytes.
-    pub(crate) set: Vec<(Place, Vec<u8>)>,
+    /// What is written.
+    pub(crate) set: Vec<Command>,
+    /// Writes back what was there before, in the opposite order; filled when the step acts.
+    pub(crate) back: Vec<Command>,
     /// Write back after this time.
     pub(crate) pulse: Option<Time>,
     /// Inputs of the simulated bus.
@@ -28,7 +29,7 @@ enum Phase {
     /// It acts at this time.
     Delayed(Time),
     /// The variables go back at this time.
-    Pulsing(Time, Vec<(Place, Vec<u8>)>),
+    Pulsing(Time),
 }
 
 /// Who plays the operator.
@@ -58,7 +59,7 @@ impl Operator {
 
     /// Does what is to be done before the scan at `now`. A step takes at least one scan.
     pub(crate) fn act(&mut self, engine: &mut Engine, bus: &mut Bus, now: Time) {
-        let Some((step, watch)) = self.steps.get(self.current) else { return };
+        let Some((step, watch)) = self.steps.get_mut(self.current) else { return };
         if self.failed.is_some() {
             return;
         }
@@ -74,16 +75,16 @@ impl Operator {
         }
         match &self.phase {
             Phase::Delayed(time) if now >= *time => {
-                let before = apply(step, engine, bus);
+                apply(step, engine, bus);
                 self.phase = match step.pulse {
-                    Some(pulse) => Phase::Pulsing(Time(now.0 + pulse.0), before),
+                    Some(pulse) => Phase::Pulsing(Time(now.0 + pulse.0)),
                     None => self.next(),
                 };
             }
-            Phase::Pulsing(time, before) if now >= *time => {
-                for (place, bytes) in before {
+            Phase::Pulsing(time) if now >= *time => {
+                for command in step.back.iter().rev() {
                     // The place was resolved and its size does not change.
-                    let _ = engine.write(*place, bytes);
+                    let _ = engine.command(command);
                 }
                 self.phase = self.next();
             }
@@ -97,16 +98,16 @@ impl Operator {
     }
 }
 
-/// Writes what a step writes; what was there before.
-fn apply(step: &BoundStep, engine: &mut Engine, bus: &mut Bus) -> Vec<(Place, Vec<u8>)> {
-    let mut before = Vec::with_capacity(step.set.len());
-    for (place, bytes) in &step.set {
-        before.push((*place, engine.read(*place).to_vec()));
+/// Writes what a step writes, and remembers what was there before.
+fn apply(step: &mut BoundStep, engine: &mut Engine, bus: &mut Bus) {
+    for (command, back) in step.set.iter().zip(&mut step.back) {
+        if let Command::Write { place, bytes } = back {
+            bytes.copy_from_slice(engine.read(*place));
+        }
         // The place was resolved and the bytes have its size.
-        let _ = engine.write(*place, bytes);
+        let _ = engine.command(command);
     }
     for (name, value) in &step.inputs {
         bus.set_input(name, *value);
     }
-    before
 }

@@ -96,7 +96,10 @@ fn variables_are_set_and_read_by_name() {
     let mut machine = machine(MANIFEST);
     machine.set("GVL.Target", "-2.5").unwrap();
     assert_eq!(machine.literal("gvl.target"), Ok("-2.5".into()));
-    assert_eq!(machine.set("GVL.Fixed", "4"), Err(VariableError::Constant("GVL.Fixed".into())));
+    assert_eq!(
+        machine.set("GVL.Fixed", "4"),
+        Err(VariableError::Access { path: "GVL.Fixed".into(), error: takt_engine::AccessError::Constant })
+    );
     assert!(machine.set("GVL.Targt", "1").unwrap_err().to_string().contains("did you mean `Target`?"));
     assert!(machine.set("GVL.Go", "7").is_err());
     assert!(machine.string("GVL.Go").is_err());
@@ -109,7 +112,7 @@ fn every_name_that_does_not_exist_has_its_place() {
     check("\"GVL.Stop\" =", "\"GVL.Stp\" =", "takt.toml:5:1: there is no `Stp` in `GVL`; did you mean `Stop`?");
     check("\"GVL.Pressure\" =", "\"GVL.Go\" =", "takt.toml:7:1:");
     check("\"GVL.Go\" = true", "\"GVL.Go\" = 12", "takt.toml:18:");
-    check("\"GVL.Go\" = true", "\"GVL.Fixed\" = 12", "`GVL.Fixed` is a constant");
+    check("\"GVL.Go\" = true", "\"GVL.Fixed\" = 12", "`GVL.Fixed`: a constant cannot be written");
     check("{ stop = true }", "{ stp = true }", "the simulated bus has no input `stp` (did you mean `stop`?)");
     check("fActPosition", "fActPostion", "did you mean `fActPosition`?");
     check("outputs = [\"lamp\"]", "outputs = [\"lamp\", \"oil\"]", "two channels are called `oil`");

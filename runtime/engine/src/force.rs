@@ -1,0 +1,120 @@
+//! Variables that are held at values. Room for them is there from the start: to force allocates nothing.
+
+use crate::command::AccessError;
+use takt_ir::Place;
+
+/// Variables that may be forced at the same time.
+const MOST: usize = 1024;
+/// Bytes of their values, and as many again for what was there before.
+const ROOM: usize = 1 << 16;
+
+/// A variable that is held at a value.
+#[derive(Debug, Clone, Copy)]
+struct Force {
+    place: Place,
+    /// Bits of the first byte that are held.
+    mask: u8,
+    len: u32,
+}
+
+/// A forced variable as others see it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Forced<'a> {
+    /// The variable.
+    pub place: Place,
+    /// What it is held at.
+    pub bytes: &'a [u8],
+    /// What it was before it was forced for the first time.
+    pub before: &'a [u8],
+}
+
+/// The forces, in the order they were made.
+#[derive(Debug)]
+pub(crate) struct Forces {
+    list: Vec<Force>,
+    /// Values, one behind the other.
+    values: Vec<u8>,
+    /// In the same places what was there before.
+    before: Vec<u8>,
+}
+
+impl Default for Forces {
+    fn default() -> Self {
+        Self { list: Vec::with_capacity(MOST), values: Vec::with_capacity(ROOM), before: Vec::with_capacity(ROOM) }
+    }
+}
+
+/// Writes a value; of its first byte only the bits of `mask`.
+pub(crate) fn put(target: &mut [u8], bytes: &[u8], mask: u8) {
+    let first = target.first().map_or(0, |byte| byte & !mask);
+    target.copy_from_slice(bytes);
+    if let Some(byte) = target.first_mut() {
+        *byte = *byte & mask | first;
+    }
+}
+
+impl Forces {
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// The forces and where their bytes begin.
+    fn spans(&self) -> impl Iterator<Item = (Force, std::ops::Range<usize>)> {
+        self.list.iter().scan(0, |end, force| {
+            let start = *end;
+            *end += force.len as usize;
+            Some((*force, start..*end))
+        })
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = Forced<'_>> {
+        self.spans().map(|(force, span)| Forced { place: force.place, bytes: &self.values[span.clone()], before: &self.before[span] })
+    }
+
+    /// One by its number.
+    pub fn get(&self, index: usize) -> Option<Forced<'_>> {
+        self.iter().nth(index)
+    }
+
+    /// Holds a place at a value; what is there now is remembered unless it is forced already.
+    pub fn add(&mut self, place: Place, mask: u8, bytes: &[u8], now: &[u8]) -> Result<(), AccessError> {
+        let held = self.spans().find(|(force, _)| force.place == place);
+        if let Some((_, span)) = held {
+            self.values[span].copy_from_slice(bytes);
+            return Ok(());
+        }
+        if self.list.len() == MOST || self.values.len() + bytes.len() > ROOM {
+            return Err(AccessError::TooManyForces { most: MOST, bytes: ROOM });
+        }
+        self.list.push(Force { place, mask, len: bytes.len() as u32 });
+        self.values.extend_from_slice(bytes);
+        self.before.extend_from_slice(now);
+        Ok(())
+    }
+
+    /// Lets the last force go, or the one on a place; what was there before goes back into the image if it is to be restored. False if there is none.
+    pub fn release(&mut self, place: Option<Place>, image: &mut [u8], restore: bool) -> bool {
+        let wanted = |(_, (force, _)): &(usize, (Force, _))| place.is_none_or(|place| force.place == place);
+        let found = self.spans().enumerate().filter(wanted).last();
+        let Some((index, (force, span))) = found else { return false };
+        if restore && let Some(target) = image.get_mut(force.place.offset as usize..force.place.offset as usize + span.len()) {
+            put(target, &self.before[span.clone()], force.mask);
+        }
+        self.values.drain(span.clone());
+        self.before.drain(span);
+        self.list.remove(index);
+        true
+    }
+
+    /// Writes the values into the image.
+    pub fn apply(&self, image: &mut [u8]) {
+        for (force, span) in self.spans() {
+            let start = force.place.offset as usize;
+            if let Some(target) = image.get_mut(start..start + span.len()) {
+                put(target, &self.values[span], force.mask);
+            }
+        }
+    }
+}
