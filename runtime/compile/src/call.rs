@@ -423,6 +423,8 @@ impl<'a> Lowering<'_, 'a> {
         };
         let same = match (self.c.types.get(ty), self.c.types.get(operand.ty)) {
             (Type::String(wanted), Type::String(found)) | (Type::WString(wanted), Type::WString(found)) => found >= wanted,
+            // An enumeration is handed on as the integer that it is; not the other way, where any number could come out.
+            (Type::Elem(wanted), Type::Enum(found)) => found.base == *wanted,
             _ => self.refers_to(ty, operand.ty),
         };
         if !same {

@@ -124,7 +124,8 @@ impl<'a> Lowering<'_, 'a> {
         }
         let (place, ty) = self.bit_place(place.inside(field.offset), field.ty);
         let mut value = self.at(place, ty, span);
-        value.fixed = operand.fixed;
+        // CODESYS refuses to assign an output from outside, and lets the members of a structure there be assigned.
+        value.fixed = operand.fixed.filter(|why| kind == StructKind::Block || *why != BLOCK_OUTPUT);
         match field.section {
             Section::Output if foreign => value.fixed = Some(BLOCK_OUTPUT),
             Section::State if foreign => value.fixed = Some(BLOCK_VARIABLE),

@@ -15,7 +15,7 @@ pub(crate) use kind::Kind;
 pub(crate) use trivia::{Comment, PlacedPragma, unquote};
 
 use crate::{Code, Diagnostic, FileId, Span};
-use scan::{PrefixClass, full_width, prefix_class, run, scan_date, scan_duration, scan_number, word_end};
+use scan::{PrefixClass, full_width, prefix_class, run, scan_date, scan_duration, scan_number, text_over_lines, word_end};
 
 /// More messages than this about one file are of no use to anybody.
 pub(crate) const MAX_DIAGNOSTICS: usize = 1000;
@@ -411,7 +411,10 @@ impl<'a> Scanner<'a> {
                     self.jump(at + 1);
                     return self.push(Kind::Literal, start);
                 }
-                b'\n' => break,
+                b'\n' => match text_over_lines(bytes, at, quote) {
+                    Some(end) => at = end,
+                    None => break,
+                },
                 b'$' if at + 1 < bytes.len() && bytes[at + 1] != b'\n' && bytes[at + 1].is_ascii() => at += 2,
                 _ => at += 1,
             }

@@ -28,9 +28,9 @@ fn target(name: &str) -> Option<Target> {
     }
 }
 
-/// `INT_TO_REAL`, `TO_REAL`: the types named.
+/// `INT_TO_REAL`, `TO_REAL`, `ANY_TO_REAL`: the types named.
 pub(super) fn conversion(name: &str) -> Option<(Option<Target>, Target)> {
-    if let Some(to) = name.strip_prefix("TO_") {
+    if let Some(to) = name.strip_prefix("ANY_").unwrap_or(name).strip_prefix("TO_") {
         return Some((None, target(to)?));
     }
     let (from, to) = name.split_once("_TO_")?;

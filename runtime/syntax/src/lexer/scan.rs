@@ -86,6 +86,29 @@ pub(super) fn scan_number(bytes: &[u8], at: usize) -> (usize, Kind) {
     (end, kind)
 }
 
+/// Lines of a text behind its first that are looked at for its end.
+const MORE_LINES: usize = 8;
+
+/// The closing quote of a text that goes on behind a line break, as CODESYS reads it. A quote that was forgotten is not such a text: assignments or statements
+/// follow it, or the next line has texts of its own.
+pub(super) fn text_over_lines(bytes: &[u8], line_break: usize, quote: u8) -> Option<usize> {
+    let mut at = line_break + 1;
+    for _ in 0..MORE_LINES {
+        let end = run(bytes, at, |byte| byte != b'\n');
+        let line = &bytes[at..end];
+        if let Some(close) = line.iter().position(|&byte| byte == quote) {
+            let is_text = !line[..close].contains(&b';') && !line[..close].windows(2).any(|pair| pair == b":=");
+            let is_odd = line.iter().filter(|&&byte| byte == quote).count() % 2 == 1;
+            return (is_text && is_odd).then_some(at + close);
+        }
+        if end == bytes.len() || line.contains(&b';') || line.windows(2).any(|pair| pair == b":=") {
+            return None;
+        }
+        at = end + 1;
+    }
+    None
+}
+
 pub(super) fn scan_duration(bytes: &[u8], from: usize) -> usize {
     let mut end = from + usize::from(matches!(bytes.get(from), Some(b'+' | b'-')));
     loop {

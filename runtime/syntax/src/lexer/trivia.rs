@@ -116,7 +116,9 @@ impl Scanner<'_> {
         let rest = self.text[from..].trim_start();
         let word = rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or("");
         let known = PRAGMA_WORDS.iter().any(|known| known.eq_ignore_ascii_case(word));
-        let close = closing_brace(&self.text.as_bytes()[from..], known).map(|length| from + length);
+        let bytes = &self.text.as_bytes()[from..];
+        let spans_lines = word.eq_ignore_ascii_case("attribute").then(|| quote_over_lines(bytes)).flatten();
+        let close = spans_lines.or_else(|| closing_brace(bytes, known)).map(|length| from + length);
         match close {
             Some(close) => {
                 self.jump(close + 1);
@@ -176,6 +178,28 @@ fn closing_brace(bytes: &[u8], known: bool) -> Option<usize> {
     None
 }
 
+/// Length of an attribute's contents whose value is one text of several lines, as TwinCAT allows: `{attribute 'a' := '` … `'}`.
+fn quote_over_lines(bytes: &[u8]) -> Option<usize> {
+    let ends = bytes.iter().position(|&byte| byte == b'\n')?;
+    let assigned = bytes[..ends].windows(2).position(|pair| pair == b":=")? + 2;
+    let skipped = assigned + bytes[assigned..ends].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+    let quote = *bytes.get(skipped).filter(|byte| matches!(byte, b'\'' | b'"'))?;
+    if bytes[skipped + 1..ends].contains(&quote) {
+        return None;
+    }
+    let mut quoted = false;
+    for (at, &byte) in bytes.iter().enumerate().skip(ends) {
+        match byte {
+            b'}' if quoted => return Some(at),
+            // Another pragma: the quote was forgotten, and must not swallow the program.
+            b'{' => return None,
+            _ if byte == quote => quoted = true,
+            _ => quoted &= byte.is_ascii_whitespace(),
+        }
+    }
+    None
+}
+
 /// A text without the quotes around it.
 pub(crate) fn unquote(text: &str) -> &str {
     text.trim().trim_matches(['\'', '"'])
@@ -208,6 +232,16 @@ mod tests {
         assert_eq!(read, [("pack_mode", Some("1"), 0), ("warning", Some("'w'"), 0), ("a", None, 0), ("if", Some("defined(x)"), 1)]);
         assert_eq!(lexed.diagnostics, []);
         assert_eq!(codes("{attribute 'a' := '} {'} {nonsense 1} x"), [("W0101", 25)]);
+    }
+
+    #[test]
+    fn the_text_of_an_attribute_may_have_lines() {
+        let lexed = lex(FileId(0), "{attribute 'pytmc' := '\n pv: Bob's; x := 1\n io: i\n' } a {attribute 'b'}");
+        let read: Vec<_> = lexed.pragmas.iter().map(|p| (p.pragma.name.as_str(), p.pragma.value.as_deref())).collect();
+        assert_eq!(read, [("pytmc", Some("\n pv: Bob's; x := 1\n io: i\n")), ("b", None)]);
+        assert_eq!(lexed.diagnostics, []);
+        // A quote that was forgotten does not swallow what follows.
+        assert_eq!(kinds("{attribute 'a' := 'x\n} b {attribute 'c' := 'y'}\n'}"), kinds("b '}"));
     }
 
     #[test]
