@@ -1,5 +1,6 @@
 //! What stands where: the type of each block instance that calls may be dispatched on, kept outside the image so that no program can forge it.
 
+use crate::plain::Plain;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -24,6 +25,28 @@ impl Classes {
     pub fn at(&self, offset: u64) -> u32 {
         let entry = offset.is_multiple_of(GRANULE).then(|| self.0.get((offset / GRANULE) as usize)).flatten();
         entry.map_or(0, |class| class.load(Relaxed))
+    }
+    /// Appends the entries that are not 0, as number of the granule and class, for a checkpoint.
+    pub fn save_into(&self, out: &mut Vec<u8>) {
+        for (granule, class) in self.0.iter().enumerate() {
+            let class = class.load(Relaxed);
+            if class != 0 {
+                out.extend_from_slice(&(granule as u32).to_le_bytes());
+                out.extend_from_slice(&class.to_le_bytes());
+            }
+        }
+    }
+    /// Takes what [`Classes::save_into`] wrote, if `fits` says so of each offset and class; false, and unchanged, when the bytes are not that.
+    pub fn restore(&self, bytes: &[u8], fits: impl Fn(u64, u32) -> bool) -> bool {
+        let entry = |e: &[u8]| (u32::load(e) as usize, u32::load(&e[4..]));
+        let entries = || bytes.chunks_exact(8).map(entry);
+        let good = |(granule, class)| granule < self.0.len() && fits(granule as u64 * GRANULE, class);
+        if !bytes.len().is_multiple_of(8) || !entries().all(good) {
+            return false;
+        }
+        self.0.iter().for_each(|class| class.store(0, Relaxed));
+        entries().for_each(|(granule, class)| self.0[granule].store(class, Relaxed));
+        true
     }
     /// `count` instances of `class` from `offset` on, one each `stride` bytes. What lies outside the table or between granules is left out.
     pub fn put(&self, offset: u64, class: u32, stride: u64, count: u64) {

@@ -4,6 +4,10 @@
 //! A program can overwrite what lies in the heap, never what is known about it.
 
 use crate::fault::Fault;
+use crate::plain::Plain;
+
+/// Marks a block that was given away, in a saved heap.
+const USED: u32 = 1 << 31;
 
 /// The smallest block, bytes.
 const LEAST: u32 = 16;
@@ -87,6 +91,62 @@ impl Heap {
         Ok(u64::from(LEAST) << given)
     }
 
+    /// Appends what is known of each block, for a checkpoint.
+    pub fn save_into(&self, out: &mut Vec<u8>) {
+        let heads = self.free.iter().map(|first| first.unwrap_or(u32::MAX));
+        heads.for_each(|first| out.extend_from_slice(&first.to_le_bytes()));
+        for (block, granule) in self.granules.iter().enumerate() {
+            let state = match granule.state {
+                State::Inside => continue,
+                State::Free(order) => u32::from(order),
+                State::Used(order) => USED | u32::from(order),
+            };
+            [block as u32, state, granule.next, granule.before].iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+        }
+    }
+
+    /// A heap over the same region with the blocks that [`Heap::save_into`] wrote; `None` when the bytes are not that.
+    pub fn restored(&self, bytes: &[u8]) -> Option<Self> {
+        let word = |bytes: &[u8], i: usize| u32::load(&bytes[i * 4..]);
+        let (heads, blocks) = bytes.split_at_checked(self.free.len() * 4).filter(|(_, blocks)| blocks.len().is_multiple_of(16))?;
+        let count = self.granules.len();
+        let mut heap = Self { granules: vec![Granule::default(); count], free: vec![None; self.free.len()], ..*self };
+        let mut end = 0;
+        for block in blocks.chunks_exact(16) {
+            let [at, state, next, before] = std::array::from_fn(|i| word(block, i));
+            let order = u8::try_from(state & !USED).ok().filter(|order| usize::from(*order) < heap.free.len())?;
+            // The blocks lie one behind the other, without a gap.
+            if at != end || !at.is_multiple_of(1 << order) || (next as usize) >= count || (before as usize) >= count {
+                return None;
+            }
+            end = at.checked_add(1 << order).filter(|end| *end as usize <= count)?;
+            let state = if state & USED == 0 { State::Free(order) } else { State::Used(order) };
+            heap.granules[at as usize] = Granule { state, next, before };
+        }
+        for order in 0..heap.free.len() {
+            let first = word(heads, order);
+            heap.free[order] = (first != u32::MAX).then_some(first);
+        }
+        (end as usize == count && heap.lists_are_whole()).then_some(heap)
+    }
+
+    /// Every free block is in the list of its order, once, and nothing else is.
+    fn lists_are_whole(&self) -> bool {
+        let mut listed = 0;
+        for (order, first) in self.free.iter().enumerate() {
+            let (mut before, mut next) = (None, *first);
+            while let Some(block) = next {
+                let Some(granule) = self.granules.get(block as usize) else { return false };
+                if granule.state != State::Free(order as u8) || granule.before != before.unwrap_or(block) || listed == self.granules.len() {
+                    return false;
+                }
+                listed += 1;
+                (before, next) = (Some(block), (granule.next != block).then_some(granule.next));
+            }
+        }
+        listed == self.granules.iter().filter(|granule| matches!(granule.state, State::Free(_))).count()
+    }
+
     fn add(&mut self, block: u32, order: u8) {
         let first = self.free[usize::from(order)].replace(block);
         self.granules[block as usize] = Granule { state: State::Free(order), next: first.unwrap_or(block), before: block };
@@ -135,6 +195,34 @@ mod tests {
         live.drain(..).for_each(|(at, _)| assert!(heap.take(at).is_ok()));
         assert_eq!(heap.give(1 << 16), Some(1024));
         assert_eq!(heap.give(1), None);
+    }
+
+    #[test]
+    fn a_saved_heap_comes_back_and_goes_on_alike_and_no_other_bytes_do() {
+        let mut heap = Heap::new(64, 1 << 12);
+        let given: Vec<u64> = (1..20).filter_map(|n| heap.give(n * 13)).collect();
+        given.iter().step_by(3).for_each(|at| assert!(heap.take(*at).is_ok()));
+        let mut saved = Vec::new();
+        heap.save_into(&mut saved);
+        let mut back = Heap::new(64, 1 << 12).restored(&saved).unwrap();
+        let go_on = |heap: &mut Heap| {
+            let mut all: Vec<_> = (1..30).map(|n| heap.give(n * 7)).collect();
+            all.extend(given.iter().map(|at| heap.take(*at).ok()));
+            all
+        };
+        assert_eq!(go_on(&mut heap), go_on(&mut back));
+        assert!((0..saved.len()).all(|cut| Heap::new(64, 1 << 12).restored(&saved[..cut]).is_none()));
+        for at in 0..saved.len() {
+            for value in [0, 1, 3, 0x80, 0xFF] {
+                let mut wrong = saved.clone();
+                wrong[at] = value;
+                // Refused, or a heap that holds what it promises.
+                if let Some(mut heap) = Heap::new(64, 1 << 12).restored(&wrong) {
+                    go_on(&mut heap);
+                }
+            }
+        }
+        assert_eq!(Heap::default().restored(&[]).map(|mut heap| heap.give(1)), Some(None));
     }
 
     #[test]

@@ -2,6 +2,8 @@
 //!
 //! A request leaves in one scan; its completion is latched at the start of a later scan (in simulation: the next). No scan waits for a disk.
 
+use std::any::Any;
+
 /// Bytes that one request reads at the most.
 pub const CHUNK: usize = 256 * 1024;
 
@@ -118,6 +120,14 @@ pub trait Host {
     fn latch(&mut self, wait: bool);
     /// The completion of a request, once, if it has been latched. On an error the buffer is lost.
     fn take(&mut self, ticket: Ticket) -> Option<Result<Chunk, HostError>>;
+    /// Requests under way and completions, for a checkpoint in the same process; waits for the former. `None`: it cannot.
+    fn save(&mut self) -> Option<Box<dyn Any>> {
+        None
+    }
+    /// Puts back what [`Host::save`] gave; false, and unchanged, when it is not that. Files stay as they are.
+    fn restore(&mut self, _: &dyn Any) -> bool {
+        false
+    }
 }
 
 /// A host without files.

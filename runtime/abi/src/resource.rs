@@ -11,6 +11,10 @@ use std::any::Any;
 pub trait Resource: Any + Send {
     /// Its content, for a checkpoint.
     fn save(&self) -> Vec<u8>;
+    /// Appends what [`Resource::save`] gives. Where checkpoints are taken while a machine runs, `out` has room: override it if `save` allocates.
+    fn save_into(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&self.save());
+    }
     /// Takes a saved content; returns false (and is as new) when the bytes are not one.
     fn restore(&mut self, bytes: &[u8]) -> bool;
     /// For downcasts.
@@ -75,6 +79,30 @@ impl Resources {
     /// The resource as `T`, if the handle is good and it is one.
     pub fn get<T: Resource>(&mut self, handle: Handle) -> Option<&mut T> {
         self.slot(handle)?.resource.as_mut()?.as_any().downcast_mut()
+    }
+    /// Appends owner, length and content of each resource, for a checkpoint. A resource that is out at the moment is left out.
+    pub fn save_into(&self, out: &mut Vec<u8>) {
+        for (owner, resource) in self.slots.iter().filter_map(|s| Some((s.owner, s.resource.as_ref()?))) {
+            out.extend_from_slice(&owner.to_le_bytes());
+            let start = out.len();
+            out.extend_from_slice(&[0; 8]);
+            resource.save_into(out);
+            let length = (out.len() - start - 8) as u64;
+            out[start..start + 8].copy_from_slice(&length.to_le_bytes());
+        }
+    }
+    /// Gives the resource of an owner the content that it saved; false if there is no such resource or the bytes are not one.
+    pub fn restore(&mut self, owner: u64, content: &[u8]) -> bool {
+        let Ok(i) = self.slots.binary_search_by_key(&owner, |s| s.owner) else { return false };
+        self.slots[i].resource.as_mut().is_some_and(|resource| resource.restore(content))
+    }
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
     }
     /// Owners and saved contents, for a checkpoint.
     pub fn save(&self) -> Vec<(u64, Vec<u8>)> {

@@ -4,6 +4,7 @@
 //! [`IoDriver::size`]; nothing in it ever grows, so an exchange allocates nothing. Names of channels are the driver's own business; the engine knows
 //! indices only.
 
+use std::any::Any;
 use takt_abi::Time;
 use takt_ir::Place;
 
@@ -132,6 +133,14 @@ pub trait IoDriver {
     fn size(&self) -> BusSize;
     /// Sends the outputs and receives the inputs. `now` is the start of the bus cycle. Must not allocate, lock or panic.
     fn exchange(&mut self, now: Time, io: &mut ProcessImage) -> Result<(), IoFault>;
+    /// What is behind the bus, for a checkpoint in the same process. `None`: it cannot be put back (a real machine), or there is nothing.
+    fn save(&self) -> Option<Box<dyn Any>> {
+        None
+    }
+    /// Puts back what [`IoDriver::save`] gave; false, and unchanged, when it is not that.
+    fn restore(&mut self, _: &dyn Any) -> bool {
+        false
+    }
 }
 
 /// A bus with nothing on it.

@@ -17,7 +17,7 @@ use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use takt_abi::{Context, Env, Fault, Resources, Time};
+use takt_abi::{Context, Env, Fault, Time};
 use takt_ir::Program;
 
 /// Fuel after which a poll looks whether it shall stop, at the latest.
@@ -369,10 +369,7 @@ impl Core {
         let image = self.image.bytes_mut();
         image.fill(0);
         image[..program.init.len()].copy_from_slice(&program.init);
-        let mut resources = Resources::default();
-        for instance in &program.resources {
-            resources.add(instance.offset.into(), (instance.make)());
-        }
+        let resources = self.new_resources();
         let (now, period) = (self.now, self.tasks[self.bus].period);
         let env = self.env.get_mut();
         env.resources = resources;

@@ -1,7 +1,8 @@
 //! Variables that are held at values. Room for them is there from the start: to force allocates nothing.
 
-use crate::command::AccessError;
-use takt_ir::Place;
+use crate::command::{AccessError, writable};
+use crate::pack::Pack;
+use takt_ir::{Place, Program, TypeId};
 
 /// Variables that may be forced at the same time.
 const MOST: usize = 1024;
@@ -106,6 +107,31 @@ impl Forces {
         self.before.drain(span);
         self.list.remove(index);
         true
+    }
+
+    /// All of them, for a checkpoint.
+    pub fn save(&self, out: &mut Vec<u8>) {
+        self.list.len().pack(out);
+        for forced in self.iter() {
+            (forced.place.offset, forced.place.ty.0).pack(out);
+            out.extend_from_slice(forced.bytes);
+            out.extend_from_slice(forced.before);
+        }
+    }
+
+    /// What was saved, if each of them may be forced in this program.
+    pub fn restored(program: &Program, from: &mut &[u8]) -> Option<Self> {
+        let mut forces = Self::default();
+        for _ in 0..usize::unpack(from)? {
+            let (offset, ty) = Pack::unpack(from)?;
+            let place = Place { offset, ty: TypeId(ty) };
+            let (range, mask) = writable(program, place).ok()?;
+            let (bytes, rest) = from.split_at_checked(range.len())?;
+            let (before, rest) = rest.split_at_checked(range.len())?;
+            *from = rest;
+            forces.add(place, mask, bytes, before).ok()?;
+        }
+        Some(forces)
     }
 
     /// Writes the values into the image.

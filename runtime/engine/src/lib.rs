@@ -13,6 +13,7 @@
 
 mod axis;
 mod bus;
+mod checkpoint;
 mod command;
 mod core;
 mod engine;
@@ -23,12 +24,14 @@ mod load;
 mod mapping;
 mod memory;
 mod options;
+mod pack;
 mod schedule;
 mod statistics;
 
 pub use axis::stage::AxisStatus;
 pub use axis::{AxisConfig, AxisLimits, AxisProblem, Encoder, FeedForward, Home, Lag, cia402::DriveState};
 pub use bus::{BusSize, Channel, DriveIn, DriveOut, IoDriver, IoFault, NoBus, ProcessImage, Signal, Wire};
+pub use checkpoint::{Checkpoint, CheckpointError};
 pub use command::{AccessError, Command, CommandError, writable};
 pub use engine::{Engine, StopHandle};
 pub use fault::{FaultRecord, Frame};

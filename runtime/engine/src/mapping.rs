@@ -16,6 +16,16 @@ impl Mapping {
         Self { at, taken: vec![0; program.types.size(at.ty) as usize] }
     }
 
+    /// What was taken, for a checkpoint.
+    pub(crate) fn taken(&self) -> &[u8] {
+        &self.taken
+    }
+
+    /// Puts it back.
+    pub(crate) fn set_taken(&mut self, taken: Vec<u8>) {
+        self.taken = taken;
+    }
+
     /// Before the programs: inputs and memory to the variable.
     pub(crate) fn latch(&mut self, image: &mut [u8]) {
         if self.at.area == Area::Output {

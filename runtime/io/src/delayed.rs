@@ -1,5 +1,6 @@
 //! A driver whose inputs come some cycles late.
 
+use std::any::Any;
 use takt_abi::Time;
 use takt_engine::{BusSize, IoDriver, IoFault, ProcessImage};
 
@@ -36,6 +37,15 @@ impl IoDriver for Delayed {
             self.next = (self.next + 1) % self.line.len();
         }
         Ok(())
+    }
+    fn save(&self) -> Option<Box<dyn Any>> {
+        Some(Box::new((self.line.clone(), self.next, self.inner.save())))
+    }
+    fn restore(&mut self, saved: &dyn Any) -> bool {
+        let Some((line, next, inner)) = saved.downcast_ref::<(Vec<ProcessImage>, usize, Option<Box<dyn Any>>)>() else { return false };
+        self.line.clone_from(line);
+        self.next = *next;
+        inner.as_ref().is_none_or(|inner| self.inner.restore(inner.as_ref()))
     }
 }
 

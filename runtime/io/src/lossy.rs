@@ -1,5 +1,6 @@
 //! A driver whose exchanges fail now and then, by seed.
 
+use std::any::Any;
 use takt_abi::Time;
 use takt_engine::{BusSize, IoDriver, IoFault, ProcessImage};
 
@@ -49,6 +50,14 @@ impl IoDriver for Lossy {
             return Err(IoFault::Lost);
         }
         self.inner.exchange(now, io)
+    }
+    fn save(&self) -> Option<Box<dyn Any>> {
+        Some(Box::new((self.state, self.left, self.inner.save())))
+    }
+    fn restore(&mut self, saved: &dyn Any) -> bool {
+        let Some((state, left, inner)) = saved.downcast_ref::<(u64, u32, Option<Box<dyn Any>>)>() else { return false };
+        (self.state, self.left) = (*state, *left);
+        inner.as_ref().is_none_or(|inner| self.inner.restore(inner.as_ref()))
     }
 }
 

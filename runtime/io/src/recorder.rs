@@ -1,5 +1,6 @@
 //! A driver that keeps what went over the bus last.
 
+use std::any::Any;
 use std::cell::RefCell;
 use std::rc::Rc;
 use takt_abi::Time;
@@ -76,6 +77,12 @@ impl IoDriver for Recorder {
         ring.next = (next + 1) % ring.records.len();
         ring.full |= ring.next == 0;
         result
+    }
+    fn save(&self) -> Option<Box<dyn Any>> {
+        self.inner.save()
+    }
+    fn restore(&mut self, saved: &dyn Any) -> bool {
+        self.inner.restore(saved)
     }
 }
 

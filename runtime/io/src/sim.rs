@@ -13,6 +13,7 @@ pub use homing::{METHODS, Method};
 pub use valve::ValveConfig;
 
 use drive::Drive;
+use std::any::Any;
 use std::cell::RefCell;
 use std::rc::Rc;
 use takt_abi::Time;
@@ -131,6 +132,7 @@ pub fn open(config: &SimConfig) -> Result<(Box<dyn IoDriver>, SimControl), OpenE
 }
 
 /// What there is at the far end of the wire.
+#[derive(Clone)]
 struct Machine {
     period: Time,
     last: Option<Time>,
@@ -143,6 +145,7 @@ struct Machine {
 }
 
 /// Terminals of one kind.
+#[derive(Clone)]
 struct Terminals<T> {
     names: Vec<String>,
     values: Vec<T>,
@@ -261,6 +264,14 @@ impl IoDriver for Sim {
     fn exchange(&mut self, now: Time, io: &mut ProcessImage) -> Result<(), IoFault> {
         self.machine.borrow_mut().exchange(now, io);
         Ok(())
+    }
+    fn save(&self) -> Option<Box<dyn Any>> {
+        Some(Box::new(self.machine.borrow().clone()))
+    }
+    fn restore(&mut self, saved: &dyn Any) -> bool {
+        let Some(machine) = saved.downcast_ref::<Machine>() else { return false };
+        self.machine.borrow_mut().clone_from(machine);
+        true
     }
 }
 

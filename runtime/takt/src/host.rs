@@ -9,6 +9,7 @@ mod service;
 mod write;
 
 use service::{Done, Job};
+use std::any::Any;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
@@ -23,9 +24,18 @@ pub struct Files {
     jobs: Option<SyncSender<Job>>,
     done: Receiver<Done>,
     latched: Vec<Done>,
+    /// Completions that a checkpoint waited for; seen at the next latch.
+    arrived: Vec<Done>,
     under_way: usize,
     next: u64,
     thread: Option<JoinHandle<()>>,
+}
+
+/// Requests and completions of a checkpoint.
+struct Saved {
+    latched: Vec<Done>,
+    arrived: Vec<Done>,
+    next: u64,
 }
 
 /// Starts the service for the project in `root`. The folders `nc` and `data` need not exist.
@@ -33,12 +43,20 @@ pub fn open(root: PathBuf) -> std::io::Result<Files> {
     let (jobs, incoming) = sync_channel(UNDER_WAY);
     let (outgoing, done) = sync_channel(UNDER_WAY);
     let thread = std::thread::Builder::new().name("files".into()).spawn(move || service::serve(&root, &incoming, &outgoing))?;
-    Ok(Files { jobs: Some(jobs), done, latched: Vec::with_capacity(UNDER_WAY), under_way: 0, next: 1, thread: Some(thread) })
+    Ok(Files {
+        jobs: Some(jobs),
+        done,
+        latched: Vec::with_capacity(UNDER_WAY),
+        arrived: Vec::new(),
+        under_way: 0,
+        next: 1,
+        thread: Some(thread),
+    })
 }
 
 impl Host for Files {
     fn submit(&mut self, request: Request, buffer: &mut Vec<u8>) -> Result<Ticket, HostError> {
-        if self.under_way + self.latched.len() >= UNDER_WAY {
+        if self.under_way + self.latched.len() + self.arrived.len() >= UNDER_WAY {
             return Err(HostError::Busy);
         }
         let ticket = Ticket(self.next);
@@ -57,6 +75,7 @@ impl Host for Files {
     }
 
     fn latch(&mut self, wait: bool) {
+        self.latched.append(&mut self.arrived);
         while self.under_way > 0 {
             let done = if wait { self.done.recv().ok() } else { self.done.try_recv().ok() };
             let Some(done) = done else { break };
@@ -68,6 +87,24 @@ impl Host for Files {
     fn take(&mut self, ticket: Ticket) -> Option<Result<Chunk, HostError>> {
         let i = self.latched.iter().position(|done| done.ticket == ticket)?;
         Some(self.latched.swap_remove(i).result)
+    }
+
+    fn save(&mut self) -> Option<Box<dyn Any>> {
+        while self.under_way > 0 {
+            self.arrived.push(self.done.recv().ok()?);
+            self.under_way -= 1;
+        }
+        Some(Box::new(Saved { latched: self.latched.clone(), arrived: self.arrived.clone(), next: self.next }))
+    }
+
+    fn restore(&mut self, saved: &dyn Any) -> bool {
+        let Some(saved) = saved.downcast_ref::<Saved>() else { return false };
+        // What was asked for since is answered, and forgotten.
+        self.latch(true);
+        self.latched.clone_from(&saved.latched);
+        self.arrived.clone_from(&saved.arrived);
+        self.next = saved.next;
+        true
     }
 }
 

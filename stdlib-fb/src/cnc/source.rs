@@ -327,7 +327,12 @@ fn without_mark(line: u32, text: &[u8]) -> &[u8] {
 
 impl Resource for NcSource {
     fn save(&self) -> Vec<u8> {
-        save::save(self)
+        let mut bytes = Vec::new();
+        save::save(self, &mut bytes);
+        bytes
+    }
+    fn save_into(&self, out: &mut Vec<u8>) {
+        save::save(self, out);
     }
     fn restore(&mut self, bytes: &[u8]) -> bool {
         let restored = save::restore(bytes);

@@ -79,8 +79,13 @@ impl Job {
 
 impl Resource for Job {
     fn save(&self) -> Vec<u8> {
-        let ticket = self.ticket.map_or(0, |t| t.0);
-        std::iter::once(u8::from(self.stale)).chain(ticket.to_le_bytes()).collect()
+        let mut bytes = Vec::new();
+        self.save_into(&mut bytes);
+        bytes
+    }
+    fn save_into(&self, out: &mut Vec<u8>) {
+        out.push(u8::from(self.stale));
+        out.extend_from_slice(&self.ticket.map_or(0, |t| t.0).to_le_bytes());
     }
     fn restore(&mut self, bytes: &[u8]) -> bool {
         (self.ticket, self.stale) = (None, false);
@@ -109,6 +114,9 @@ impl Default for Transfer {
 impl Resource for Transfer {
     fn save(&self) -> Vec<u8> {
         self.0.save()
+    }
+    fn save_into(&self, out: &mut Vec<u8>) {
+        self.0.save_into(out);
     }
     fn restore(&mut self, bytes: &[u8]) -> bool {
         self.0.restore(bytes)

@@ -59,17 +59,21 @@ impl Opener {
 
 impl Resource for Opener {
     fn save(&self) -> Vec<u8> {
-        let mut bytes = vec![self.last_id];
+        let mut bytes = Vec::new();
+        self.save_into(&mut bytes);
+        bytes
+    }
+    fn save_into(&self, out: &mut Vec<u8>) {
+        out.push(self.last_id);
         for file in &self.files {
-            bytes.push(file.map_or(0, |f| f.id));
+            out.push(file.map_or(0, |f| f.id));
             if let Some(file) = file {
-                bytes.extend(file.mode.0.to_le_bytes());
-                bytes.extend(file.position.to_le_bytes());
-                bytes.extend(file.path.0);
+                out.extend_from_slice(&file.mode.0.to_le_bytes());
+                out.extend_from_slice(&file.position.to_le_bytes());
+                out.extend_from_slice(&file.path.0);
             }
         }
-        bytes.extend(self.job.save());
-        bytes
+        self.job.save_into(out);
     }
     fn restore(&mut self, bytes: &[u8]) -> bool {
         *self = Self::default();

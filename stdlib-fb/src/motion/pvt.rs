@@ -22,6 +22,9 @@ impl Resource for PvtSpline {
     fn save(&self) -> Vec<u8> {
         self.0.save()
     }
+    fn save_into(&self, out: &mut Vec<u8>) {
+        self.0.save_into(out);
+    }
     fn restore(&mut self, bytes: &[u8]) -> bool {
         self.0.restore(bytes)
     }

@@ -297,13 +297,20 @@ impl Spline {
 
     /// Everything, as bytes.
     pub fn save(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.save_into(&mut bytes);
+        bytes
+    }
+
+    /// The same, appended.
+    pub fn save_into(&self, out: &mut Vec<u8>) {
         let ended = u64::from(self.ended);
         let head = [self.first, self.filled, self.eliminated, self.solved, self.back, ended, self.segment, self.start_slope.to_bits()];
-        let knots = (self.first..self.filled).flat_map(|i| {
+        head.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+        for i in self.first..self.filled {
             let k = self.at(i);
-            [k.t, k.p, k.v, k.lead, k.rest].map(f64::to_bits)
-        });
-        head.into_iter().chain(knots).flat_map(u64::to_le_bytes).collect()
+            [k.t, k.p, k.v, k.lead, k.rest].iter().for_each(|value| out.extend_from_slice(&value.to_bits().to_le_bytes()));
+        }
     }
 
     /// Takes what [`Spline::save`] wrote; false, and as new, when it is not that.

@@ -22,6 +22,17 @@ pub enum DriveState {
 }
 
 impl DriveState {
+    /// All of them.
+    pub(crate) const ALL: [Self; 8] = [
+        Self::NotReady,
+        Self::SwitchOnDisabled,
+        Self::ReadyToSwitchOn,
+        Self::SwitchedOn,
+        Self::OperationEnabled,
+        Self::QuickStopActive,
+        Self::FaultReaction,
+        Self::Fault,
+    ];
     /// From the statusword.
     pub fn of(status: u16) -> Self {
         match (status & 0x4F, status & 0x6F) {

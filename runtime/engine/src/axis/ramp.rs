@@ -11,6 +11,8 @@ pub struct Ramp {
     elapsed: f64,
 }
 
+crate::pack::pack_fields!(Ramp { start, velocity, duration, elapsed });
+
 impl Ramp {
     /// From a position (units) and velocity (units/s) to rest in `duration` s.
     pub fn new(start: f64, velocity: f64, duration: f64) -> Self {

@@ -11,6 +11,7 @@ use super::cia402::{self, DriveState, Goal};
 use super::ramp::{Ramp, common_duration};
 use super::{AxisConfig, Encoder, FeedForward};
 use crate::bus::{DriveIn, DriveOut, ProcessImage};
+use crate::pack::Pack;
 use takt_abi::{AxisRef, AxisState, Bool, Dword, Plain, SmcError, Word};
 
 /// Exchanges without an answer after which a drive counts as gone.
@@ -94,6 +95,112 @@ struct Axis {
     quick_stop: bool,
 }
 
+impl Pack for Homing {
+    fn pack(&self, out: &mut Vec<u8>) {
+        let (kind, cycles) = match *self {
+            Self::Idle => (0u8, 0),
+            Self::Entering => (1, 0),
+            Self::Running(cycles) => (2, cycles),
+            Self::Leaving => (3, 0),
+        };
+        (kind, cycles).pack(out);
+    }
+    fn unpack(from: &mut &[u8]) -> Option<Self> {
+        Some(match <(u8, u32)>::unpack(from)? {
+            (0, _) => Self::Idle,
+            (1, _) => Self::Entering,
+            (2, cycles) => Self::Running(cycles),
+            (3, _) => Self::Leaving,
+            _ => return None,
+        })
+    }
+}
+
+impl Pack for Reset {
+    fn pack(&self, out: &mut Vec<u8>) {
+        let (kind, seconds) = match *self {
+            Self::Idle => (0u8, 0.0),
+            Self::Arming => (1, 0.0),
+            Self::Waiting(seconds) => (2, seconds),
+        };
+        (kind, seconds).pack(out);
+    }
+    fn unpack(from: &mut &[u8]) -> Option<Self> {
+        Some(match <(u8, f64)>::unpack(from)? {
+            (0, _) => Self::Idle,
+            (1, _) => Self::Arming,
+            (2, seconds) => Self::Waiting(seconds),
+            _ => return None,
+        })
+    }
+}
+
+impl Axis {
+    /// What changes while it runs.
+    fn save(&self, out: &mut Vec<u8>) {
+        // A new field is either configuration or written here and read below.
+        let Self {
+            config: _,
+            scale: _,
+            offset,
+            homed,
+            silent,
+            was_online,
+            drive,
+            was_enabled,
+            actual,
+            velocity,
+            acceleration,
+            lag,
+            target,
+            speed,
+            ramp,
+            homing,
+            reset,
+            quick_stop,
+        } = self;
+        [offset, actual, velocity, acceleration, lag, target, speed].into_iter().for_each(|v| v.pack(out));
+        [homed, was_online, was_enabled, quick_stop].into_iter().for_each(|v| v.pack(out));
+        silent.pack(out);
+        drive.pack(out);
+        ramp.pack(out);
+        homing.pack(out);
+        reset.pack(out);
+    }
+    fn restored(&self, from: &mut &[u8]) -> Option<Self> {
+        let mut v = [0.0; 7];
+        for value in &mut v {
+            *value = f64::unpack(from)?;
+        }
+        let mut b = [false; 4];
+        for value in &mut b {
+            *value = bool::unpack(from)?;
+        }
+        let [offset, actual, velocity, acceleration, lag, target, speed] = v;
+        let [homed, was_online, was_enabled, quick_stop] = b;
+        Some(Self {
+            config: self.config.clone(),
+            scale: self.scale,
+            offset,
+            homed,
+            silent: Pack::unpack(from)?,
+            was_online,
+            drive: Pack::unpack(from)?,
+            was_enabled,
+            actual,
+            velocity,
+            acceleration,
+            lag,
+            target,
+            speed,
+            ramp: Pack::unpack(from)?,
+            homing: Pack::unpack(from)?,
+            reset: Pack::unpack(from)?,
+            quick_stop,
+        })
+    }
+}
+
 /// All axes.
 pub(crate) struct Stage {
     axes: Vec<Axis>,
@@ -166,6 +273,20 @@ impl Stage {
             io.drives_out[axis.config.drive] = axis.brake(&mut r, braking, self.dt);
             axis.store(&r, image);
         }
+    }
+
+    /// What changes while it runs, for a checkpoint.
+    pub fn save(&self, out: &mut Vec<u8>) {
+        let Self { axes, dt: _, cycle, answered, braking } = self;
+        axes.iter().for_each(|axis| axis.save(out));
+        (*cycle, (*answered, *braking)).pack(out);
+    }
+
+    /// The stage with the same configuration and the saved state; `None` when the bytes are not one.
+    pub fn restored(&self, from: &mut &[u8]) -> Option<Self> {
+        let axes = self.axes.iter().map(|axis| axis.restored(from)).collect::<Option<_>>()?;
+        let (cycle, (answered, braking)) = Pack::unpack(from)?;
+        Some(Self { axes, dt: self.dt, cycle, answered, braking })
     }
 
     pub fn at_rest(&self) -> bool {

@@ -164,6 +164,7 @@ impl DriveConfig {
 }
 
 /// A drive at run time.
+#[derive(Clone)]
 pub(super) struct Drive {
     config: DriveConfig,
     dt: f64,

@@ -39,7 +39,7 @@ pub(super) struct Terminals {
 }
 
 /// The valve at run time.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Valve {
     config: ValveConfig,
     period: Time,

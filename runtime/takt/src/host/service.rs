@@ -19,7 +19,7 @@ pub(super) struct Job {
 }
 
 /// A request that is over.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Done {
     pub(super) ticket: Ticket,
     pub(super) result: Result<Chunk, HostError>,

@@ -1,17 +1,15 @@
 //! A source as bytes, for checkpoints: everything that decides what comes next, the request under way included.
-//!
-//! An error keeps its number and place; its text becomes the general one.
 
 use super::{Awaited, NcSource, Phase, Settings};
 use crate::cnc::trouble::Kind;
 use takt_abi::{CHUNK, Plain, SmcError, Str, Ticket};
 
 /// Says which layout follows.
-const MARK: u64 = 0x4e43_536f_7572_0001;
+const MARK: u64 = 0x4e43_536f_7572_0002;
 
-struct Writer(Vec<u8>);
+struct Writer<'a>(&'a mut Vec<u8>);
 
-impl Writer {
+impl Writer<'_> {
     fn word(&mut self, value: u64) {
         self.0.extend_from_slice(&value.to_le_bytes());
     }
@@ -58,9 +56,39 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The content of a source.
-pub fn save(source: &NcSource) -> Vec<u8> {
-    let mut w = Writer(Vec::new());
+/// What can be wrong with a file as a whole; what is wrong with its words is found behind the source.
+fn kind_to_words(kind: Kind) -> (u64, i32) {
+    match kind {
+        Kind::NoName => (1, 0),
+        Kind::NotFound => (2, 0),
+        Kind::Outside => (3, 0),
+        Kind::NotReadable(code) => (4, code),
+        Kind::Empty => (5, 0),
+        Kind::NotText => (6, 0),
+        Kind::LineTooLong => (7, 0),
+        Kind::Changed => (8, 0),
+        other => (0, other.error().0.into()),
+    }
+}
+
+fn kind_of_words(kind: u64, detail: i32) -> Option<Kind> {
+    Some(match kind {
+        0 => Kind::Known(SmcError(i16::try_from(detail).ok()?)),
+        1 => Kind::NoName,
+        2 => Kind::NotFound,
+        3 => Kind::Outside,
+        4 => Kind::NotReadable(detail),
+        5 => Kind::Empty,
+        6 => Kind::NotText,
+        7 => Kind::LineTooLong,
+        8 => Kind::Changed,
+        _ => return None,
+    })
+}
+
+/// The content of a source, appended.
+pub fn save(source: &NcSource, out: &mut Vec<u8>) {
+    let mut w = Writer(out);
     w.word(MARK);
     w.bytes(&source.path.0);
     w.settings(&source.settings);
@@ -68,9 +96,10 @@ pub fn save(source: &NcSource) -> Vec<u8> {
         Phase::Idle => (0, 0, 0, 0),
         Phase::Reading => (1, 0, 0, 0),
         Phase::Read => (2, 0, 0, 0),
-        Phase::Failed(t) => (3, t.kind.error().0 as u64, t.line, t.column),
+        Phase::Failed(t) => (3, kind_to_words(t.kind).0, t.line, t.column),
     };
-    [phase, error, line.into(), column.into()].into_iter().for_each(|v| w.word(v));
+    let detail = if let Phase::Failed(t) = source.phase { kind_to_words(t.kind).1 as u32 } else { 0 };
+    [phase, error, detail.into(), line.into(), column.into()].into_iter().for_each(|v| w.word(v));
     w.word(source.queued.is_some().into());
     if let Some((path, settings)) = &source.queued {
         w.bytes(&path.0);
@@ -87,7 +116,6 @@ pub fn save(source: &NcSource) -> Vec<u8> {
     w.bytes(&source.carry);
     [source.handed.into(), source.line.into(), source.received].into_iter().for_each(|v| w.word(v));
     w.word(source.file_size.map_or(u64::MAX, |s| s));
-    w.0
 }
 
 /// The source of a saved content.
@@ -97,12 +125,14 @@ pub fn restore(bytes: &[u8]) -> Option<NcSource> {
         return None;
     }
     let mut s = NcSource { path: r.path()?, settings: r.settings()?, ..NcSource::default() };
-    let (phase, error, line, column) = (r.word()?, r.word()?, r.word()? as u32, r.word()? as u32);
+    let (phase, error, detail) = (r.word()?, r.word()?, r.word()? as u32 as i32);
+    let (line, column) = (r.word()? as u32, r.word()? as u32);
     s.phase = match phase {
         0 => Phase::Idle,
         1 => Phase::Reading,
         2 => Phase::Read,
-        _ => Phase::Failed(Kind::Known(SmcError(error as i16)).at(line, column)),
+        3 => Phase::Failed(kind_of_words(error, detail)?.at(line, column)),
+        _ => return None,
     };
     if r.word()? != 0 {
         s.queued = Some((r.path()?, r.settings()?));
