@@ -41,6 +41,11 @@ pub enum Fault {
     WrongDelete,
     /// The run was stopped from outside.
     Stopped,
+    /// A task started behind a missed release too many times in a row.
+    Overruns {
+        /// How many times.
+        count: u32,
+    },
     /// A method was called through a pointer, reference or interface that does not lead to an instance that has it.
     NoInstance {
         /// The offset.
@@ -63,6 +68,7 @@ impl Fault {
             Self::WrongDelete => 9,
             Self::Stopped => 10,
             Self::NoInstance { .. } => 11,
+            Self::Overruns { .. } => 12,
         }
     }
     /// Whether a program may handle it with `__TRY`: what its own data led to, not what stops it from outside.
@@ -70,7 +76,7 @@ impl Fault {
         Self::from_raw(code, [0; 3]).is_some_and(|fault| match fault {
             Self::Index { .. } | Self::DivisionByZero | Self::NullPointer | Self::WildPointer { .. } => true,
             Self::Block { .. } | Self::WrongDelete | Self::NoInstance { .. } => true,
-            Self::StackOverflow { .. } | Self::Watchdog | Self::Panic | Self::Stopped => false,
+            Self::StackOverflow { .. } | Self::Watchdog | Self::Overruns { .. } | Self::Panic | Self::Stopped => false,
         })
     }
     /// The facts as three words, for [`crate::Context`].
@@ -81,6 +87,7 @@ impl Fault {
             Self::StackOverflow { depth } => [depth.into(), 0, 0],
             Self::Block { error } => [error.into(), 0, 0],
             Self::NoInstance { offset } => [offset as i64, 0, 0],
+            Self::Overruns { count } => [count.into(), 0, 0],
             _ => [0; 3],
         }
     }
@@ -98,6 +105,7 @@ impl Fault {
             9 => Self::WrongDelete,
             10 => Self::Stopped,
             11 => Self::NoInstance { offset: facts[0] as u64 },
+            12 => Self::Overruns { count: facts[0] as u32 },
             _ => Self::Panic,
         })
     }
@@ -115,6 +123,7 @@ impl Fault {
             Self::WrongDelete => "wrong-delete",
             Self::Stopped => "stopped",
             Self::NoInstance { .. } => "no-instance",
+            Self::Overruns { .. } => "overruns",
         }
     }
 }
@@ -132,6 +141,9 @@ impl std::fmt::Display for Fault {
             Self::Panic => write!(f, "internal defect of Takt in a block; please report it"),
             Self::WrongDelete => write!(f, "__DELETE of memory that __NEW did not give"),
             Self::Stopped => write!(f, "stopped on request"),
+            Self::Overruns { count } => {
+                write!(f, "the task missed its release {count} times in a row: its scans, or those of higher tasks, take too long")
+            }
             Self::NoInstance { offset } => write!(f, "16#{offset:X} is no instance of a block that can be called here"),
         }
     }

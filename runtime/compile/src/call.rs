@@ -526,6 +526,8 @@ impl<'a> Lowering<'_, 'a> {
                     let native = self.c.native(desc.name, cycle);
                     let this = self.pointer_to(place);
                     self.b.push(Inst::Native { native, args: vec![this], dst: None, site });
+                    // A block may work for 20 µs: a higher task need not wait for the next one too.
+                    self.b.push(Inst::Poll { cost: 1, site });
                 }
                 None => {
                     self.report(Code::NotCallable, span, format!("`{}` has no body", structure.name));

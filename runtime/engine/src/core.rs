@@ -8,6 +8,7 @@ use crate::bus::{IoDriver, IoFault, ProcessImage};
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::force::Forces;
+use crate::limits::Alarm;
 use crate::load::Link;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned, execute};
@@ -22,8 +23,8 @@ use takt_ir::Program;
 
 /// Fuel after which a poll looks whether it shall stop, at the latest.
 const STOP_SLICE: u64 = 1 << 16;
-/// The same under a real clock, where it looks whether a higher task is due.
-const PREEMPT_SLICE: u64 = 1 << 8;
+/// Scans in one step at the most, so that an overloaded machine still listens between steps.
+const SCANS_IN_A_STEP: u32 = 64;
 /// Preemptions that are recorded.
 const RECORDED: usize = 1 << 16;
 
@@ -49,7 +50,7 @@ pub(crate) struct Core {
     pub fuel_limit: u64,
     pub depth_limit: u32,
     pub clock: Clock,
-    pub watchdog: Time,
+    pub alarm: Option<Box<dyn Alarm>>,
     pub stopwatch: Option<fn() -> u64>,
     /// Sorted by task, scan, fuel (virtual clock).
     pub preempt: Vec<Preemption>,
@@ -90,7 +91,8 @@ impl Core {
         if self.fault.is_some() {
             return self.step_faulted(now);
         }
-        while let Some((task, now)) = self.pick(now) {
+        for _ in 0..SCANS_IN_A_STEP.max(self.tasks.len() as u32) {
+            let Some((task, now)) = self.pick(now) else { break };
             self.release(task, now);
             if self.fault.is_some() || self.stop.load(Ordering::Relaxed) {
                 break;
@@ -145,7 +147,9 @@ impl Core {
         if index == self.bus {
             self.map(Mapping::latch);
         }
-        self.run(index, now);
+        if !self.check_overruns(index, now) {
+            self.run(index, now);
+        }
         self.apply_forces();
         if index == self.bus {
             self.map(Mapping::publish);
@@ -171,6 +175,9 @@ impl Core {
             stopwatch: self.stopwatch.map(|read| read()),
         };
         let task = &mut self.tasks[index];
+        if matches!(self.clock, Clock::Real(_)) {
+            task.statistics.jitter_ns.add(started.0.saturating_sub(task.release.0).max(0) as u64);
+        }
         task.start(now);
         (task.running, task.step) = (true, self.steps);
         (env.now, env.period, env.task, env.cycle) = (now, task.period, index as u32, task.statistics.cycles);
@@ -189,6 +196,10 @@ impl Core {
             task.statistics.scan_ns.add(total_ns.saturating_sub(self.inner_ns));
         }
         let took = ended.0 - self.scan_started.0;
+        if matches!(self.clock, Clock::Real(_)) {
+            task.ended(ended, Time(took));
+            self.check_time(index, Time(took - self.inner_time.0), ended);
+        }
         self.inner_ns = outer.inner_ns + total_ns;
         self.inner_time = Time(outer.inner_time.0 + took);
         self.scan_started = outer.scan_started;
@@ -212,7 +223,9 @@ impl Core {
         let (start, size) = task.stack;
         task.lane.get_mut().prepare(granted as i64, u64::from(start) + u64::from(size));
         let (entry, executor) = (task.entry, self.executor.clone());
+        self.set_alarm(index);
         let fault = execute(self, |core, i| &mut core.tasks[i].lane, index, &executor, entry, start.into());
+        self.clear_alarm();
         if let Some(fault) = fault {
             let task = &self.tasks[index];
             let raw = RawFault::of(&task.lane.get().ctx, fault, Some(index), now, task.statistics.cycles);
@@ -230,9 +243,9 @@ impl Core {
 
     /// Fuel that the scan may have consumed before the next poll must come back here: so much that it happens exactly at the number that is asked for.
     fn grant(&mut self, index: usize, consumed: u64) -> u64 {
-        let mut until = self.fuel_limit;
+        let mut until = self.fuel_limit_of(index);
         match self.clock {
-            Clock::Real(_) => until = until.min(consumed.saturating_add(PREEMPT_SLICE)),
+            Clock::Real(_) => until = until.min(consumed.saturating_add(self.slice())),
             Clock::Virtual => {
                 until = until.min(consumed.saturating_add(STOP_SLICE));
                 if let Some(next) = self.next_preemption(index) {
@@ -265,7 +278,7 @@ impl Core {
             return Some(Fault::Watchdog);
         };
         let consumed = self.tasks[index].granted.saturating_add_signed(ctx.fuel.saturating_neg());
-        if consumed > self.fuel_limit {
+        if consumed > self.fuel_limit_of(index) {
             return Some(Fault::Watchdog);
         }
         if self.stop.load(Ordering::Relaxed) {
@@ -274,10 +287,12 @@ impl Core {
         match self.clock {
             Clock::Virtual => self.preempt_as_told(index, consumed),
             Clock::Real(clock) => {
-                if self.watchdog.0 > 0 && clock().0 - self.scan_started.0 - self.inner_time.0 > self.watchdog.0 {
+                Self::hear_alarm(ctx);
+                if self.too_long(index, clock()) {
                     return Some(Fault::Watchdog);
                 }
                 self.preempt_if_due(index, consumed, clock);
+                self.set_alarm(index);
             }
         }
         if self.fault.is_some() {
@@ -292,6 +307,7 @@ impl Core {
     fn preempt_as_told(&mut self, index: usize, consumed: u64) {
         while self.fault.is_none() && self.next_preemption(index).is_some_and(|p| p.at_fuel <= consumed) {
             self.tasks[index].next_preemption += 1;
+            self.watch_events(self.now);
             let priority = self.tasks[index].priority;
             let higher = self.tasks.iter().enumerate().filter(|(_, t)| t.priority < priority && !t.running);
             let next = higher.filter_map(|(i, t)| Some((t.next_release()?, t.priority, i))).min();
@@ -306,6 +322,7 @@ impl Core {
         let now = clock();
         let due = |t: &TaskState| t.priority < priority && t.due(now);
         while self.fault.is_none() {
+            self.watch_events(now);
             let next = self.tasks.iter().enumerate().filter(|(_, t)| due(t)).min_by_key(|(i, t)| (t.priority, *i));
             let Some((i, _)) = next else { return };
             if self.recorded.len() < RECORDED {

@@ -106,6 +106,11 @@ impl Engine {
         &self.core.tasks[task].statistics
     }
 
+    /// Starts the statistics of all tasks anew. The number of a task's scan ([`TaskStatistics::cycles`]) goes on.
+    pub fn reset_statistics(&mut self) {
+        self.core.tasks.iter_mut().for_each(|task| task.statistics.reset());
+    }
+
     /// Where tasks were interrupted under a real clock, in order (the first 65 536).
     pub fn preemptions(&self) -> &[Preemption] {
         &self.core.recorded
@@ -146,6 +151,7 @@ impl Engine {
         let release = core.tasks[core.bus].release;
         for task in &mut core.tasks {
             task.release = release;
+            (task.watched.slow, task.watched.missed) = (0, 0);
         }
         Ok(())
     }

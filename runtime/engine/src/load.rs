@@ -7,6 +7,7 @@ use crate::core::Core;
 use crate::engine::Engine;
 use crate::executor::Executor;
 use crate::fault::FaultRecord;
+use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned};
 use crate::options::{Clock, ExecutorKind, Options};
@@ -29,6 +30,13 @@ pub enum LoadError {
     NoTask,
     /// No task has this name.
     BusTask {
+        /// The name.
+        name: String,
+        /// Those that exist.
+        known: Vec<String>,
+    },
+    /// Limits are given for a task that does not exist.
+    TaskLimits {
         /// The name.
         name: String,
         /// Those that exist.
@@ -110,7 +118,9 @@ impl std::fmt::Display for LoadError {
             Self::Verify(error) => write!(f, "the program is not sound (a defect of Takt; please report it): {error}"),
             Self::Jit(error) => write!(f, "the program cannot be compiled to machine code: {error}"),
             Self::NoTask => write!(f, "the program has no task"),
-            Self::BusTask { name, known } => write!(f, "there is no task `{name}`; there are: {}", known.join(", ")),
+            Self::BusTask { name, known } | Self::TaskLimits { name, known } => {
+                write!(f, "there is no task `{name}`; there are: {}", known.join(", "))
+            }
             Self::Memory { size } => write!(f, "no memory for an image of {size} bytes"),
             Self::NativeStack { needed, given } => write!(
                 f,
@@ -146,7 +156,8 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         ..Env::new(Time(0), options.host)
     });
     let mut lane = || Lane::new(&program, &mut image, &mut env, options.depth_limit);
-    let tasks: Vec<_> = (0..program.tasks.len()).map(|i| TaskState::new(&program, i, lane())).collect();
+    let mut tasks: Vec<_> = (0..program.tasks.len()).map(|i| TaskState::new(&program, i, lane())).collect();
+    limit(&program, &mut tasks, options.limits, &options.task_limits)?;
     let spare = Pinned::new(lane());
     let period = tasks[bus].period;
     env.get_mut().bus_period = period;
@@ -171,7 +182,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         depth_limit: options.depth_limit,
         fuel_limit: options.fuel_limit.min(i64::MAX as u64 / 2),
         clock: options.clock,
-        watchdog: options.watchdog,
+        alarm: options.alarm,
         stopwatch: options.stopwatch,
         preempt,
         recorded,
@@ -206,6 +217,18 @@ fn bus_task(program: &Program, name: Option<&str>) -> Result<usize, LoadError> {
         .iter()
         .position(|t| t.name.eq_ignore_ascii_case(name))
         .ok_or_else(|| LoadError::BusTask { name: name.into(), known: program.tasks.iter().map(|t| t.name.clone()).collect() })
+}
+
+/// Gives each task its limits.
+fn limit(program: &Program, tasks: &mut [TaskState], all: Limits, single: &[(String, Limits)]) -> Result<(), LoadError> {
+    tasks.iter_mut().for_each(|task| task.watched.limits = all);
+    for (name, limits) in single {
+        let index = program.tasks.iter().position(|t| t.name.eq_ignore_ascii_case(name));
+        let known = || program.tasks.iter().map(|t| t.name.clone()).collect();
+        let index = index.ok_or_else(|| LoadError::TaskLimits { name: name.clone(), known: known() })?;
+        tasks[index].watched.limits = *limits;
+    }
+    Ok(())
 }
 
 fn check_axes(program: &Program, options: &Options, drives: usize) -> Result<(), LoadError> {

@@ -2,6 +2,7 @@
 
 use crate::axis::AxisConfig;
 use crate::bus::Wire;
+use crate::limits::{Alarm, Limits};
 use takt_abi::{Host, NoHost, Time};
 
 /// Which executor runs the program.
@@ -55,8 +56,12 @@ pub struct Options {
     pub native_stack: usize,
     /// Virtual or real.
     pub clock: Clock,
-    /// Time one scan may take under [`Clock::Real`] before it is a [`takt_abi::Fault::Watchdog`]. 0: no limit but fuel.
-    pub watchdog: Time,
+    /// Limits under [`Clock::Real`] of the tasks that have none of their own.
+    pub limits: Limits,
+    /// Limits of single tasks under [`Clock::Real`], by name.
+    pub task_limits: Vec<(String, Limits)>,
+    /// Brings a scan to its next poll in time under [`Clock::Real`]. `None`: scans look at the clock every few hundred units of fuel.
+    pub alarm: Option<Box<dyn Alarm>>,
     /// Where tasks are interrupted under [`Clock::Virtual`]; a test or a recording says so.
     pub preempt: Vec<Preemption>,
     /// Monotonic nanoseconds, for the statistics of execution times only. `None`: no statistics.
@@ -75,7 +80,9 @@ impl Default for Options {
             depth_limit: 1000,
             native_stack: 7 << 18, // of the 2 MiB that a thread has by default
             clock: Clock::Virtual,
-            watchdog: Time(0),
+            limits: Limits::default(),
+            task_limits: Vec::new(),
+            alarm: None,
             preempt: Vec::new(),
             stopwatch: None,
         }

@@ -1,9 +1,11 @@
 //! When tasks are due.
 //!
 //! Cyclic tasks are released at whole multiples of their interval after the first step; a release that has passed while the task could not run is an
-//! overrun and is skipped. An event task is due once per rising edge of its variable, seen after inputs are latched and after each scan. A freewheeling
-//! task is released every millisecond.
+//! overrun and is skipped. An event task is due once per rising edge of its variable, seen after inputs are latched, after each scan and at polls. A
+//! freewheeling task is released every millisecond in virtual time, where a scan takes none; under a real clock it starts again 1 ms after its scan
+//! ended, or, where tasks of lower priority wait, after as long as the scan took if that is longer: it leaves them half of the processor.
 
+use crate::limits::Watched;
 use crate::memory::{Lane, Pinned};
 use crate::statistics::TaskStatistics;
 use takt_abi::Time;
@@ -26,6 +28,9 @@ pub(crate) struct TaskState {
     pub pending: bool,
     /// Last value of an event task's variable.
     pub level: bool,
+    /// There are tasks of lower priority.
+    pub lower: bool,
+    pub watched: Watched,
     /// A scan is under way (perhaps interrupted).
     pub running: bool,
     /// Number of the step in which it last ran.
@@ -54,6 +59,8 @@ impl TaskState {
             release: Time(0),
             pending: false,
             level: false,
+            lower: program.tasks.iter().any(|other| other.priority > task.priority),
+            watched: Watched::default(),
             running: false,
             step: 0,
             granted: 0,
@@ -80,8 +87,18 @@ impl TaskState {
         }
         let late = now.0.saturating_sub(self.release.0) / self.period.0;
         let late = late.max(0);
-        self.statistics.overruns += late as u64;
+        if !matches!(self.trigger, Trigger::Freewheeling) {
+            self.statistics.overruns += late as u64;
+            self.watched.missed = if late > 0 { self.watched.missed.saturating_add(1) } else { 0 };
+        }
         self.release = Time(self.release.0.saturating_add((late + 1).saturating_mul(self.period.0)));
+    }
+    /// A scan that took so long has ended, under a real clock.
+    pub fn ended(&mut self, now: Time, took: Time) {
+        if matches!(self.trigger, Trigger::Freewheeling) {
+            let pause = if self.lower { took.max(IDLE_PERIOD) } else { IDLE_PERIOD };
+            self.release = Time(now.0.saturating_add(pause.0));
+        }
     }
     /// Looks at an event task's variable.
     pub fn watch(&mut self, image: &[u8], now: Time) {

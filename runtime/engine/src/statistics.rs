@@ -1,21 +1,23 @@
-//! Execution times of a task, in buckets that are there from the start.
+//! Times of a task, in buckets that are there from the start.
 //!
 //! A bucket is a quarter of a power of two wide, so a percentile is right to 19 %; the maximum and the mean are exact. Recording allocates nothing.
 
 const BUCKETS: usize = 40 * 4;
 
-/// Execution times in nanoseconds.
+/// Times in nanoseconds.
 #[derive(Debug, Clone)]
 pub struct Histogram {
     buckets: [u64; BUCKETS],
     count: u64,
     sum: u128,
     max: u64,
+    min: u64,
+    last: u64,
 }
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { buckets: [0; BUCKETS], count: 0, sum: 0, max: 0 }
+        Self { buckets: [0; BUCKETS], count: 0, sum: 0, max: 0, min: u64::MAX, last: 0 }
     }
 }
 
@@ -38,12 +40,14 @@ fn end(bucket: usize) -> u64 {
 }
 
 impl Histogram {
-    /// Adds one execution time.
+    /// Adds one time.
     pub fn add(&mut self, ns: u64) {
         self.buckets[bucket(ns)] += 1;
         self.count += 1;
         self.sum += u128::from(ns);
         self.max = self.max.max(ns);
+        self.min = self.min.min(ns);
+        self.last = ns;
     }
     /// How many.
     pub fn count(&self) -> u64 {
@@ -56,6 +60,14 @@ impl Histogram {
     /// The longest, ns.
     pub fn max(&self) -> u64 {
         self.max
+    }
+    /// The shortest, ns; 0 if there is none.
+    pub fn min(&self) -> u64 {
+        if self.count == 0 { 0 } else { self.min }
+    }
+    /// The last, ns; 0 if there is none.
+    pub fn last(&self) -> u64 {
+        self.last
     }
     /// The time that a share `q` (0..1) of all did not exceed, ns; never more than the maximum.
     pub fn percentile(&self, q: f64) -> u64 {
@@ -74,7 +86,7 @@ impl Histogram {
 /// What is known of a task's scans.
 #[derive(Debug, Clone, Default)]
 pub struct TaskStatistics {
-    /// Scans started.
+    /// Scans started since the program was loaded; [`crate::Engine::reset_statistics`] leaves it, because it numbers the scans.
     pub cycles: u64,
     /// Releases that were missed because the task or a higher one was still running.
     pub overruns: u64,
@@ -84,6 +96,15 @@ pub struct TaskStatistics {
     pub fuel_max: u64,
     /// Execution times of the scans, without those of tasks that interrupted; the bus task's with axis stage and exchange. Empty without a stopwatch.
     pub scan_ns: Histogram,
+    /// From release to start of the scans. Empty in virtual time.
+    pub jitter_ns: Histogram,
+}
+
+impl TaskStatistics {
+    /// Starts anew, but for the number of the scan.
+    pub(crate) fn reset(&mut self) {
+        *self = Self { cycles: self.cycles, ..Self::default() };
+    }
 }
 
 #[cfg(test)]
@@ -108,6 +129,7 @@ mod tests {
         near(0.5, 5000.0);
         near(0.99, 9900.0);
         assert_eq!((h.max(), h.percentile(1.0), h.mean()), (10_000, 10_000, 5000.5));
+        assert_eq!((h.min(), h.last(), Histogram::default().min()), (1, 10_000, 0));
         assert_eq!(Histogram::default().percentile(0.5), 0);
     }
 }

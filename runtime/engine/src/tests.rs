@@ -220,7 +220,8 @@ fn preemptions_under_a_real_clock_are_recorded_and_can_be_repeated() {
 #[test]
 fn the_watchdog_counts_time_on_a_machine() {
     let text = two_tasks(&mark("A", "v0 = const 1"), &long("B", 1_000_000));
-    let options = || Options { clock: Clock::Real(ticking), watchdog: Time(500_000), ..Options::default() };
+    let options =
+        || Options { clock: Clock::Real(ticking), limits: Limits { watchdog: Time(500_000), ..Limits::default() }, ..Options::default() };
     both(&text, options, |mut engine| {
         CLOCK.set(0);
         engine.step(Time(0));
@@ -457,3 +458,4 @@ fn a_fault_in_the_initial_values_is_told_at_loading() {
 
 mod addresses;
 mod commands;
+mod limits;

@@ -265,6 +265,7 @@ fn term(term: &Term, out: &mut String) -> fmt::Result {
                 Fault::StackOverflow { depth } => format!(" {depth}"),
                 Fault::Block { error } => format!(" {error}"),
                 Fault::NoInstance { offset } => format!(" {offset}"),
+                Fault::Overruns { count } => format!(" {count}"),
                 _ => String::new(),
             };
             writeln!(out, "fault {}{facts} @{}", fault.name(), site.0)

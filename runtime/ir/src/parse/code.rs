@@ -272,6 +272,7 @@ fn fault(cursor: &mut Cursor<'_>) -> Result<Fault, ParseError> {
         "stack-overflow" => Fault::StackOverflow { depth: cursor.number()? },
         "block" => Fault::Block { error: cursor.number()? },
         "no-instance" => Fault::NoInstance { offset: cursor.number()? },
+        "overruns" => Fault::Overruns { count: cursor.number()? },
         other => {
             let plain = [Fault::DivisionByZero, Fault::NullPointer, Fault::Watchdog, Fault::Panic, Fault::WrongDelete, Fault::Stopped];
             let found = plain.into_iter().find(|fault| fault.name() == other);
