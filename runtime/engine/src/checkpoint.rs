@@ -115,6 +115,9 @@ impl SavedTask {
             entry: _,
             stack: _,
             lane: _,
+            lower: _,
+            // Counts under a real clock only.
+            watched: _,
             release,
             pending,
             level,
