@@ -4,7 +4,7 @@ use crate::case::{Case, Expected, Waveform, expectations, waveform};
 use std::sync::Arc;
 use takt_abi::Time;
 use takt_compile::{Input, Options as Choices, Output};
-use takt_engine::{Engine, ExecutorKind, NoBus, Options};
+use takt_engine::{Engine, ExecutorKind, NoBus, Options, Reset};
 use takt_ir::{Place, Program};
 use takt_syntax::Source;
 
@@ -107,6 +107,15 @@ fn play(program: &Arc<Program>, wave: &Waveform, executor: ExecutorKind) -> Resu
     let mut engine = load(program, executor)?;
     let scans = wave.rows.iter().map(|r| r.values.len()).max().unwrap_or(1);
     for scan in 0..scans {
+        for (_, kind) in wave.resets.iter().filter(|(before, _)| *before == scan + 1) {
+            let kind = match kind.as_str() {
+                "warm" => Reset::Warm,
+                "cold" => Reset::Cold,
+                "origin" => Reset::Origin,
+                other => return Err(format!("`{other}` is no kind of restart")),
+            };
+            engine.reset(kind).map_err(|record| format!("the restart ends in a fault: {record}"))?;
+        }
         for row in wave.rows.iter().filter(|r| r.drives) {
             if let Some(value) = row.values.get(scan).filter(|v| *v != "_") {
                 let place = place(program, &row.path)?;

@@ -3,6 +3,7 @@
 //! `--- name check ---`: every line `// ^ CODE text` says that the line above it has a message with that code at the caret's column, whose text,
 //! with the help in brackets behind it, contains `text` (`// <- CODE text`: at column 1); there must be no other message. `--- name lint ---` is the same with warnings of likely mistakes. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
 //! expects (`_` does not), `every 10ms` is the step, `fault NAME at LINE:COL` expects the run to end so, `stack BODY:LINE …` its callers.
+//! `reset warm before 3` restarts the program before the third scan (warm, cold, origin).
 //! `--- name ir ---`: a program in the text form of the IR, for what ST cannot reach; the waveform stands behind `;|`, and `refused TEXT` says that the
 //! verifier must not let it pass.
 
@@ -90,6 +91,8 @@ pub struct Waveform {
     pub fault: Option<String>,
     /// `main:7 outer:3`.
     pub stack: Option<String>,
+    /// Restarts: `reset warm before 3` is (3, "warm").
+    pub resets: Vec<(usize, String)>,
     /// Part of the verifier's message.
     pub refused: Option<String>,
 }
@@ -106,6 +109,9 @@ pub fn waveform(source: &str) -> Result<Waveform, String> {
             wave.fault = Some(fault.trim().into());
         } else if let Some(reason) = line.strip_prefix("refused ") {
             wave.refused = Some(reason.trim().into());
+        } else if let Some(reset) = line.strip_prefix("reset ") {
+            let (kind, scan) = reset.split_once(" before ").ok_or(format!("`{line}` is not of the form `reset warm before 3`"))?;
+            wave.resets.push((scan.trim().parse().map_err(|_| format!("`{scan}` is no number of a scan"))?, kind.trim().into()));
         } else if let Some(stack) = line.strip_prefix("stack ") {
             wave.stack = Some(stack.trim().into());
         } else {

@@ -283,7 +283,7 @@ fn a_fault_of_the_program_stops_five_moving_axes_on_their_line() {
     assert!(
         m.engine.at_rest() && m.engine.axes().all(|a| a.drive == DriveState::SwitchOnDisabled || a.drive == DriveState::ReadyToSwitchOn)
     );
-    m.engine.reset().expect("starts again");
+    m.engine.reset(takt_engine::Reset::Warm).expect("starts again");
     m.run(10);
     assert_eq!(m.states(), [AxisState::power_off; 5]);
     assert!(m.axis(1).bHomed.get() && (m.axis(1).fActPosition - m.really(1)).abs() < 2e-4, "the reference outlives the fault");

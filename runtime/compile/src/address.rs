@@ -6,6 +6,8 @@
 mod mapping;
 mod overlap;
 
+pub(crate) use mapping::indices;
+
 use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand, Thing};
 use crate::place::Place;

@@ -82,7 +82,15 @@ impl<'a> Lowering<'_, 'a> {
     /// Sets what is not bytes; its offset is from `offset` on.
     pub(crate) fn set_late(&mut self, base: Base, offset: u32, late: Late<'a>) {
         let at = offset + late.offset;
+        let retained = self.c.retained_at(at).filter(|_| matches!(base, Base::Image));
+        self.in_retained(retained, late.span(), |l| l.set_late_here(base, at, late));
+    }
+
+    fn set_late_here(&mut self, base: Base, at: u32, late: Late<'a>) {
         match late.what {
+            What::Expr(expr) if !self.points(late.ty) && (!matches!(base, Base::Image) || self.c.retained_at(at).is_some()) => {
+                self.unless_kept(|l| l.set_initial(base, at, late.ty, expr));
+            }
             What::Expr(expr) => self.set_initial(base, at, late.ty, expr),
             What::Construct(decl) => {
                 let mark = self.b.mark();
@@ -102,11 +110,14 @@ impl<'a> Lowering<'_, 'a> {
                 }
                 self.each(place, elem, count, span, &mut |l, place| l.construct(place, elem, None, args, span));
                 if let Some(init) = decl.and_then(|d| d.init.as_ref()).filter(|_| self.c.constructs(elem)) {
-                    self.set_again(place, ty, init);
+                    self.unless_kept(|l| l.set_again(place, ty, init));
                 }
             }
             Type::Struct(_) => match self.c.pou_of_type.get(&ty).copied() {
-                Some(pou) => self.construct_block(pou, place, ty, decl, args, span),
+                Some(pou) => {
+                    let whole = self.c.block_kind(pou);
+                    self.in_retained(whole, span, |l| l.construct_block(pou, place, ty, decl, args, span));
+                }
                 None => self.construct_structure(place, ty),
             },
             _ => {}
@@ -152,7 +163,7 @@ impl<'a> Lowering<'_, 'a> {
             self.report(takt_syntax::Code::BadArgument, arg.span, format!("`{name}` has no method FB_Init that takes arguments"));
         }
         if let Some(init) = decl.and_then(|d| d.init.as_ref()).filter(|_| last.is_some()) {
-            self.set_again(place, ty, init);
+            self.unless_kept(|l| l.set_again(place, ty, init));
         }
         for base in bases {
             for unit in self.c.after_init(base) {
@@ -170,10 +181,11 @@ impl<'a> Lowering<'_, 'a> {
         let taken: Vec<_> = vars.iter().filter(|v| self.c.passing(v).is_some()).cloned().collect();
         let mut preset: Vec<(usize, Operand)> = Vec::new();
         for (i, v) in taken.iter().enumerate() {
-            let implicit = matches!(key(&v.name).as_str(), "BINITRETAINS" | "BINCOPYCODE");
-            if implicit && v.ty == bool_type {
-                let value = Value::Int(i128::from(key(&v.name) == "BINITRETAINS"));
-                preset.push((i, self.constant(value, bool_type, span)));
+            let name = key(&v.name);
+            if matches!(name.as_str(), "BINITRETAINS" | "BINCOPYCODE") && v.ty == bool_type {
+                let retains = name == "BINITRETAINS";
+                let value = if retains { self.init_retains(bool_type, span) } else { self.constant(Value::Int(0), bool_type, span) };
+                preset.push((i, value));
                 continue;
             }
             if args.is_some() {

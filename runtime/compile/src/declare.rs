@@ -42,7 +42,7 @@ impl<'a> Compiler<'a> {
             Unit::Globals(globals) => self.collect_globals(file, globals),
             Unit::Configuration(configuration) => {
                 for block in &configuration.globals {
-                    self.collect_list_block(library, None, block);
+                    self.collect_list_block(library, None, block, false);
                 }
             }
             Unit::Interface(tree) => {
@@ -184,10 +184,10 @@ impl<'a> Compiler<'a> {
                 list
             }
         };
-        self.collect_list_block(library, Some(list), &globals.vars);
+        self.collect_list_block(library, Some(list), &globals.vars, attribute("task_snapshot").is_some());
     }
 
-    fn collect_list_block(&mut self, library: bool, list: Option<usize>, block: &'a tree::VarBlock) {
+    fn collect_list_block(&mut self, library: bool, list: Option<usize>, block: &'a tree::VarBlock, latched: bool) {
         if block.kind == VarKind::Config {
             return self.addresses.configured.extend(&block.vars);
         }
@@ -200,6 +200,8 @@ impl<'a> Compiler<'a> {
                 kind: VarKind::Global,
                 home: self.home,
                 constant: block.constant,
+                retain: crate::retain::kind_of(block),
+                latched: latched || crate::snapshot::is_marked(&decl.pragmas),
                 state: Progress::Untouched,
             });
             match list {

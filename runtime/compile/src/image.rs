@@ -191,7 +191,7 @@ impl<'a> Compiler<'a> {
 
     fn resources_in(&mut self, ty: TypeId, offset: u32) {
         if let Some(make) = self.native_blocks.get(&ty).and_then(|desc| desc.resource) {
-            self.program.resources.push(ResourceInstance { offset, make });
+            self.program.resources.push(ResourceInstance { offset, ty, make });
             return;
         }
         match self.types.get(ty).clone() {

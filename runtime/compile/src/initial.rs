@@ -49,7 +49,7 @@ pub(crate) enum Known {
 }
 
 impl Late<'_> {
-    fn span(&self) -> Span {
+    pub(crate) fn span(&self) -> Span {
         match self.what {
             What::Expr(expr) => expr.span,
             What::Construct(decl) => decl.name.span,

@@ -172,6 +172,9 @@ pub(crate) struct GlobalVar<'a> {
     pub(crate) kind: VarKind,
     pub(crate) home: Option<&'a tree::Home>,
     pub(crate) constant: bool,
+    pub(crate) retain: Option<takt_ir::RetainKind>,
+    /// `{attribute 'task_snapshot'}`.
+    pub(crate) latched: bool,
     pub(crate) state: Progress,
 }
 

@@ -80,6 +80,10 @@ pub(crate) struct Compiler<'a> {
     pub(crate) depth: u32,
     /// Names that may still be compared in search of what was meant.
     pub(crate) comparisons: usize,
+    /// How instances of blocks are retained as a whole, per unit.
+    pub(crate) block_kinds: Vec<Option<takt_ir::RetainKind>>,
+    /// Bytes of the image that are retained, and persistent, in order.
+    pub(crate) kept_ranges: [Vec<(u32, u32)>; 2],
     /// Next free byte of the image.
     pub(crate) next: u64,
     /// Statements that set what cannot be bytes, with the unit whose names they use.
@@ -130,6 +134,8 @@ impl<'a> Compiler<'a> {
             queue: Vec::new(),
             depth: 0,
             comparisons: crate::limits::COMPARISONS,
+            block_kinds: Vec::new(),
+            kept_ranges: Default::default(),
             next: takt_ir::NULL_ZONE.into(),
             late: Vec::new(),
         }
@@ -145,6 +151,7 @@ impl<'a> Compiler<'a> {
         self.resolve_all();
         self.check_classes();
         self.lay_out();
+        self.list_retained();
         let tasks = self.tasks();
         self.lower_all();
         let conditions = self.lower_conditions();
@@ -153,6 +160,7 @@ impl<'a> Compiler<'a> {
         self.finish_classes();
         self.mark_recursion();
         self.finish_image(tasks);
+        self.find_latched();
         self.lint();
         let mut program = std::mem::take(&mut self.program);
         program.sites = std::mem::take(&mut self.sites.all);

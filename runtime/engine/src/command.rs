@@ -3,6 +3,7 @@
 use crate::engine::Engine;
 use crate::fault::FaultRecord;
 use crate::force::{Forced, put};
+use crate::retain::Reset;
 use takt_ir::{Place, Program, Type};
 
 /// A change from outside.
@@ -34,8 +35,8 @@ pub enum Command {
         /// As for one.
         restore: bool,
     },
-    /// Clears a fault and starts the program anew.
-    Reset,
+    /// Clears a fault and starts the program anew, with the retained values that this kind of restart keeps.
+    Reset(Reset),
     /// Stops the program as a fault does: axes are brought to rest, outputs go to their safe values.
     Halt,
 }
@@ -149,7 +150,7 @@ impl Engine {
             }
             // The last one first: of two forces on the same bytes the older knows what was there.
             Command::ReleaseAll { restore } => while self.core.forces.release(None, self.core.image.bytes_mut(), *restore) {},
-            Command::Reset => self.reset().map_err(CommandError::Initial)?,
+            Command::Reset(kind) => self.reset(*kind).map_err(CommandError::Initial)?,
             Command::Halt => self.halt(),
         }
         Ok(())

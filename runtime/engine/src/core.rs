@@ -13,6 +13,7 @@ use crate::load::Link;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned, execute};
 use crate::options::{Clock, Preemption};
+use crate::retain::{Keeper, Reset, Restore};
 use crate::schedule::TaskState;
 use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -47,6 +48,8 @@ pub(crate) struct Core {
     pub io_fault: Option<IoFault>,
     pub io_faults: u64,
     pub forces: Forces,
+    /// Takes snapshots of the retained variables.
+    pub keeper: Option<Keeper>,
     pub fuel_limit: u64,
     pub depth_limit: u32,
     pub clock: Clock,
@@ -97,6 +100,16 @@ impl Core {
             if self.fault.is_some() || self.stop.load(Ordering::Relaxed) {
                 break;
             }
+        }
+        if self.fault.is_none() && self.tasks[self.bus].step == self.steps {
+            self.keep(now);
+        }
+    }
+
+    /// Takes a snapshot of the retained variables if one is due. No task is in the middle of a scan.
+    fn keep(&mut self, now: Time) {
+        if let Some(keeper) = &mut self.keeper {
+            keeper.at_boundary(now, self.image.bytes());
         }
     }
 
@@ -380,16 +393,62 @@ impl Core {
         self.forces.apply(self.image.bytes_mut());
     }
 
-    /// Puts the program at its start: initial bytes, resources, initial values, axes.
-    pub fn initialise(&mut self) -> Result<(), Box<FaultRecord>> {
+    /// Puts the program at its start: initial bytes, retained values, resources, initial values, axes.
+    ///
+    /// Retained values stand there before FB_Init runs, as in CODESYS. Where some are missing, the program is initialised without any first, so that what
+    /// is missing gets its initial value even if that is computed.
+    pub fn initialise(&mut self, restore: Option<&Restore>) -> Result<(), Box<FaultRecord>> {
+        let mut all = None;
+        if let Some(restore) = restore.filter(|r| !r.complete && self.program.init_body.is_some()) {
+            self.start(None)?;
+            restore.apply(self.image.bytes_mut());
+            all = Some(Restore::of_image(&self.program, restore.kind, self.image.bytes()));
+        }
+        self.start(all.as_ref().or(restore))?;
+        self.stage.attach(self.image.bytes_mut());
+        let now = self.now;
+        for task in &mut self.tasks {
+            task.pending = false;
+            task.watch(self.image.bytes(), now);
+            task.pending = false;
+        }
+        Ok(())
+    }
+
+    /// The bytes that the switch of the start code has while it runs.
+    fn set_switch(&mut self, kind: Option<Reset>) {
+        let at = self.program.restart as usize;
+        let value = match kind {
+            None | Some(Reset::Origin) => 0,
+            Some(Reset::Warm) => 1,
+            Some(Reset::Cold) => 2,
+        };
+        if at != 0 {
+            self.image.bytes_mut()[at..at + takt_ir::retain::RESTART_BYTES as usize].copy_from_slice(&[value, 0]);
+        }
+    }
+
+    fn start(&mut self, restore: Option<&Restore>) -> Result<(), Box<FaultRecord>> {
         let program = self.program.clone();
         let image = self.image.bytes_mut();
         image.fill(0);
         image[..program.init.len()].copy_from_slice(&program.init);
+        if let Some(restore) = restore {
+            restore.apply(image);
+        }
+        self.set_switch(restore.map(|r| r.kind));
         let resources = self.new_resources();
         let (now, period) = (self.now, self.tasks[self.bus].period);
         let env = self.env.get_mut();
         env.resources = resources;
+        env.heap = program.heap();
+        if !program.classes.is_empty() {
+            env.classes.put(0, 0, takt_abi::GRANULE, u64::from(program.image_size) / takt_abi::GRANULE);
+            program.instances.iter().for_each(|run| {
+                let stride = program.class(run.class).map_or(takt_abi::GRANULE, |class| class.size.into());
+                env.classes.put(run.offset.into(), run.class, stride, run.count.into());
+            });
+        }
         (env.now, env.period, env.task, env.cycle) = (now, period, self.bus as u32, 0);
         if let Some(body) = program.init_body {
             let (start, size) = self.tasks[self.bus].stack;
@@ -400,12 +459,7 @@ impl Core {
                 return Err(Box::new(raw.record(&program)));
             }
         }
-        self.stage.attach(self.image.bytes_mut());
-        for task in &mut self.tasks {
-            task.pending = false;
-            task.watch(self.image.bytes(), now);
-            task.pending = false;
-        }
+        self.set_switch(None);
         Ok(())
     }
 }

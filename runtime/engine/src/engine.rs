@@ -8,6 +8,7 @@ use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::memory::execute;
 use crate::options::Preemption;
+use crate::retain::{Reset, Restore, RetainLayout, SnapshotReader};
 use crate::statistics::TaskStatistics;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -142,10 +143,12 @@ impl Engine {
         StopHandle(self.core.stop.clone())
     }
 
-    /// Warm restart: clears the fault and starts the program with its initial values. Axes keep their reference. On an error the fault stays.
-    pub fn reset(&mut self) -> Result<(), Box<FaultRecord>> {
+    /// Clears the fault and starts the program with its initial values, but for the variables that this kind of restart keeps: they keep what they hold
+    /// now, after a fault too. Axes keep their reference. On an error the fault stays.
+    pub fn reset(&mut self, kind: Reset) -> Result<(), Box<FaultRecord>> {
         let core = &mut self.core;
-        core.initialise()?;
+        let kept = Restore::of_image(&core.program, kind, core.image.bytes());
+        core.initialise(Some(&kept))?;
         core.fault = None;
         core.stop.store(false, Ordering::Relaxed);
         let release = core.tasks[core.bus].release;
@@ -154,6 +157,19 @@ impl Engine {
             (task.watched.slow, task.watched.missed) = (0, 0);
         }
         Ok(())
+    }
+
+    /// Where snapshots of the retained variables come out, if [`crate::Options::retain_interval`] asks for them; can be taken once.
+    pub fn snapshots(&mut self) -> Option<SnapshotReader> {
+        self.core.keeper.as_mut()?.reader()
+    }
+
+    /// The retained variables as they are now, between steps; see [`RetainLayout`]. After a fault they may be half changed.
+    pub fn retained(&self) -> Vec<u8> {
+        let layout = RetainLayout::new(&self.core.program);
+        let mut bytes = vec![0; layout.len()];
+        layout.copy(self.image(), &mut bytes);
+        bytes
     }
 
     /// Whether all axes stand still with their drives off.

@@ -9,7 +9,7 @@
 //! **Invariants.** A step allocates nothing, except the record of a fault. A fault stops the application; axes and bus go on, with safe outputs.
 //! Nothing in the image is trusted by the axis stage.
 //!
-//! **What is absent:** retained variables, traces, online change, several resources.
+//! **What is absent:** traces, online change, several resources.
 
 mod axis;
 mod bus;
@@ -26,6 +26,7 @@ mod mapping;
 mod memory;
 mod options;
 mod pack;
+mod retain;
 mod schedule;
 mod statistics;
 
@@ -40,6 +41,7 @@ pub use force::Forced;
 pub use limits::{Alarm, Limits};
 pub use load::{LoadError, WireProblem, load};
 pub use options::{Clock, ExecutorKind, Options, Preemption};
+pub use retain::{Reset, Restore, RetainLayout, Snapshot, SnapshotReader};
 pub use statistics::{Histogram, TaskStatistics};
 
 #[cfg(test)]

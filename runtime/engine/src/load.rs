@@ -11,6 +11,7 @@ use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned};
 use crate::options::{Clock, ExecutorKind, Options};
+use crate::retain::Keeper;
 use crate::schedule::{TaskState, default_bus_task};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -67,6 +68,11 @@ pub enum LoadError {
         name: String,
         /// What is wrong.
         problem: WireProblem,
+    },
+    /// Retained values that are not those of a variable of the program.
+    Restore {
+        /// Number of the part.
+        part: usize,
     },
     /// The initial values ended in a fault.
     Initial(Box<FaultRecord>),
@@ -130,6 +136,7 @@ impl std::fmt::Display for LoadError {
             ),
             Self::Axis { name, problem } => write!(f, "axis `{name}`: {problem}"),
             Self::Wire { name, problem } => write!(f, "wire `{name}`: {problem}"),
+            Self::Restore { part } => write!(f, "part {part} of the retained values does not go with the program"),
             Self::Initial(record) => write!(f, "the initial values ended in a fault: {record}"),
         }
     }
@@ -161,6 +168,10 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     let spare = Pinned::new(lane());
     let period = tasks[bus].period;
     env.get_mut().bus_period = period;
+    if let Some(part) = options.restore.as_ref().and_then(|restore| restore.defect(&program)) {
+        return Err(LoadError::Restore { part });
+    }
+    let keeper = options.retain_interval.filter(|_| !program.retained.is_empty()).map(|interval| Keeper::new(&program, interval));
     let mut preempt = options.preempt;
     preempt.sort_by_key(|p| (p.task, p.cycle, p.at_fuel));
     let recorded = Vec::with_capacity(if matches!(options.clock, Clock::Real(_)) { 1 << 16 } else { 0 });
@@ -179,6 +190,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         io_fault: None,
         io_faults: 0,
         forces: crate::force::Forces::default(),
+        keeper,
         depth_limit: options.depth_limit,
         fuel_limit: options.fuel_limit.min(i64::MAX as u64 / 2),
         clock: options.clock,
@@ -201,7 +213,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     if needed > options.native_stack {
         return Err(LoadError::NativeStack { needed, given: options.native_stack });
     }
-    core.initialise().map_err(LoadError::Initial)?;
+    core.initialise(options.restore.as_ref()).map_err(LoadError::Initial)?;
     Ok(Engine::new(core))
 }
 

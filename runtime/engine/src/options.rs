@@ -3,6 +3,7 @@
 use crate::axis::AxisConfig;
 use crate::bus::Wire;
 use crate::limits::{Alarm, Limits};
+use crate::retain::Restore;
 use takt_abi::{Host, NoHost, Time};
 
 /// Which executor runs the program.
@@ -64,6 +65,10 @@ pub struct Options {
     pub alarm: Option<Box<dyn Alarm>>,
     /// Where tasks are interrupted under [`Clock::Virtual`]; a test or a recording says so.
     pub preempt: Vec<Preemption>,
+    /// Retained values that are put back before the program starts.
+    pub restore: Option<Restore>,
+    /// How often a snapshot of the retained variables is taken ([`crate::Engine::snapshots`]). `None`: never.
+    pub retain_interval: Option<Time>,
     /// Monotonic nanoseconds, for the statistics of execution times only. `None`: no statistics.
     pub stopwatch: Option<fn() -> u64>,
 }
@@ -84,6 +89,8 @@ impl Default for Options {
             task_limits: Vec::new(),
             alarm: None,
             preempt: Vec::new(),
+            restore: None,
+            retain_interval: None,
             stopwatch: None,
         }
     }

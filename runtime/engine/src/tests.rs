@@ -181,7 +181,7 @@ fn a_scan_can_be_stopped_from_outside() {
             STOP.set(Some(engine.stop_handle()));
             engine.step(Time(0));
             assert_eq!(engine.fault().unwrap().fault, Fault::Stopped);
-            engine.reset().unwrap();
+            engine.reset(Reset::Warm).unwrap();
             assert!(engine.fault().is_none());
         },
     );
@@ -356,7 +356,7 @@ fn a_fault_names_its_place_and_puts_outputs_to_their_safe_values() {
         );
         assert_eq!((seen.borrow().bits_out[0], seen.borrow().analog_out[0]), (0, 1.5));
         assert!(engine.at_rest());
-        engine.reset().unwrap();
+        engine.reset(Reset::Warm).unwrap();
         engine.force(bit(OTHER), &[1]).unwrap();
         steps(&mut engine, 1);
         assert!(engine.fault().is_none() && engine.cycles() == 4);
@@ -459,3 +459,4 @@ fn a_fault_in_the_initial_values_is_told_at_loading() {
 mod addresses;
 mod commands;
 mod limits;
+mod retain;

@@ -16,6 +16,7 @@ mod op;
 mod parse;
 mod print;
 mod program;
+pub mod retain;
 mod symbols;
 #[cfg(test)]
 mod testing;
@@ -33,6 +34,7 @@ pub use op::{Op, Word, ops};
 pub use parse::{ParseError, parse_program};
 pub use print::print_program;
 pub use program::{Class, Dispatch, Family, Global, Instances, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger};
+pub use retain::{Latched, RetainKind, Retained};
 pub use symbols::{Place, SymbolError, resolve};
 pub use types::{Enumeration, Field, StructKind, Structure, Type, TypeId, Types, elem_name, elem_size};
 pub use value::{Scalar, format_value, read_scalar};

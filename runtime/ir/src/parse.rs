@@ -6,6 +6,7 @@
 use crate::address::{Area, Mapped};
 use crate::inst::{BodyId, Inst, SiteId, Term};
 use crate::program::{Class, Dispatch, Family, Global, Instances, Native, Program, Site, Task, Trigger};
+use crate::retain::{Latched, RetainKind, Retained};
 use crate::types::TypeId;
 use cursor::Cursor;
 
@@ -71,6 +72,14 @@ fn item(cursor: &mut Cursor<'_>, program: &mut Program, natives: &dyn Fn(&str) -
         "global" => program.globals.push(global(cursor)?),
         "area" => area(cursor, program)?,
         "mapped" => program.mapped.push(mapped(cursor)?),
+        "retained" => program.retained.push(retained(cursor)?),
+        "restart" => program.restart = cursor.number()?,
+        "latched" => {
+            let (ty, offset) = typed_at(cursor)?;
+            cursor.expect("writers")?;
+            cursor.expect("[")?;
+            program.latched.push(Latched { ty, offset, writers: cursor.list("]", |c| c.number())? });
+        }
         "task" => program.tasks.push(task(cursor)?),
         "class" => {
             let name = cursor.text()?;
@@ -152,6 +161,25 @@ fn mapped(cursor: &mut Cursor<'_>) -> Result<Mapped, ParseError> {
     let address = cursor.number()?;
     let bit = if cursor.accept("bit") { Some(cursor.number()?) } else { None };
     Ok(Mapped { area, ty, offset, address, bit })
+}
+
+/// `type 1 at 16`.
+fn typed_at(cursor: &mut Cursor<'_>) -> Result<(TypeId, u32), ParseError> {
+    cursor.expect("type")?;
+    let ty = TypeId(cursor.number()?);
+    cursor.expect("at")?;
+    Ok((ty, cursor.number()?))
+}
+
+fn retained(cursor: &mut Cursor<'_>) -> Result<Retained, ParseError> {
+    let path = cursor.text()?;
+    let (ty, offset) = typed_at(cursor)?;
+    let kind = match cursor.word()? {
+        "retain" => RetainKind::Retain,
+        "persistent" => RetainKind::Persistent,
+        other => return Err(cursor.wrong_last(&format!("expected `retain` or `persistent`, found `{other}`"))),
+    };
+    Ok(Retained { path, ty, offset, kind })
 }
 
 /// `from 1 [`.
@@ -237,6 +265,7 @@ mod tests {
         assert_eq!((&first.bodies, &first.sites, &first.files, &first.data), (&second.bodies, &second.sites, &second.files, &second.data));
         assert_eq!((&first.init, &first.tasks, &first.globals), (&second.init, &second.tasks, &second.globals));
         assert_eq!((first.areas, &first.mapped), (second.areas, &second.mapped));
+        assert_eq!((&first.retained, first.restart, &first.latched), (&second.retained, second.restart, &second.latched));
         assert_eq!(first.types, second.types);
         assert_eq!((first.init_body, first.image_size), (second.init_body, second.image_size));
     }

@@ -18,6 +18,9 @@
 //! global "GVL.x" type 0 at 16 bare
 //! area Q word at 32 size 2             ; direct addresses, counted in units
 //! mapped Q type 1 at 16 to 32 bit 3    ; VAR_CONFIG: the variable, its address
+//! retained "GVL.x" type 0 at 16 persistent ; or: retain
+//! restart 8                            ; the switch of the start code
+//! latched type 1 at 16 writers [0]     ; a copy per task
 //! task "Main" cyclic 1000000 priority 0 entry 0 stack 128 64
 //! start 0                              ; runs before the first scan
 //! body "PLC_PRG" (i64, addr:8) -> i64 frame 32 recursive @0
@@ -53,6 +56,7 @@
 use crate::address::{Area, Areas, Mapped};
 use crate::inst::{Base, Body, Const, Inst, Local, Mem, Term, Ty};
 use crate::program::{Program, Trigger};
+use crate::retain::{Latched, Retained};
 use std::fmt::{self, Write};
 use takt_abi::Fault;
 
@@ -106,6 +110,7 @@ impl Printer<'_> {
             writeln!(out, "{}", Doc(&global.doc))?;
         }
         self.addresses(out)?;
+        self.kept(out)?;
         for task in &program.tasks {
             write!(out, "task {} ", Quoted(&task.name))?;
             match task.trigger {
@@ -157,6 +162,20 @@ impl Printer<'_> {
             write!(out, "mapped {} type {} at {offset} to {address}", area.letter(), ty.0)?;
             bit.map_or(Ok(()), |bit| write!(out, " bit {bit}"))?;
             out.push('\n');
+        }
+        Ok(())
+    }
+
+    fn kept(&self, out: &mut String) -> fmt::Result {
+        for Retained { path, ty, offset, kind } in &self.program.retained {
+            writeln!(out, "retained {} type {} at {offset} {}", Quoted(path), ty.0, kind.text().to_lowercase())?;
+        }
+        if self.program.restart != 0 {
+            writeln!(out, "restart {}", self.program.restart)?;
+        }
+        for Latched { ty, offset, writers } in &self.program.latched {
+            let writers: Vec<String> = writers.iter().map(u32::to_string).collect();
+            writeln!(out, "latched type {} at {offset} writers [{}]", ty.0, writers.join(", "))?;
         }
         Ok(())
     }

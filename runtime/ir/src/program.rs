@@ -2,6 +2,7 @@
 
 use crate::address::{Areas, Mapped};
 use crate::inst::{Body, BodyId, Ty};
+use crate::retain::{Latched, Retained};
 use crate::types::{TypeId, Types};
 use takt_abi::{Classes, GRANULE, Heap, NativeFn};
 
@@ -78,6 +79,8 @@ pub struct Global {
 pub struct ResourceInstance {
     /// Offset of the instance.
     pub offset: u32,
+    /// Its type.
+    pub ty: TypeId,
     /// Makes it.
     pub make: fn() -> Box<dyn takt_abi::Resource>,
 }
@@ -181,6 +184,13 @@ pub struct Program {
     pub areas: Areas,
     /// Variables that VAR_CONFIG gives addresses.
     pub mapped: Vec<Mapped>,
+    /// Variables that outlive a restart.
+    pub retained: Vec<Retained>,
+    /// Offset of two bytes that code at the start looks at, 0 if it does not: the first one is not 0 when retained values were put back, so that they are
+    /// not initialised again; the second one belongs to that code.
+    pub restart: u32,
+    /// Variables of which tasks see a copy.
+    pub latched: Vec<Latched>,
     /// The heap of `__NEW`: first byte and bytes (16 · 2ⁿ, or 0).
     pub heap: (u32, u32),
 }

@@ -108,6 +108,10 @@ global "GVL.p" type 2 at 96 constant doc "where it is"
 global "lamp" type 12 at 240
 area Q word at 240 size 2
 mapped Q type 13 at 65 to 241 bit 3
+retained "GVL.x" type 0 at 64 retain
+retained "lamp" type 12 at 240 persistent
+restart 250
+latched type 1 at 96 writers [0, 1]
 task "Main" cyclic 1000000 priority 0 entry 0 stack 256 128
 task "Slow" event 64 bit 3 priority 1 entry 0 stack 384 128
 start 0

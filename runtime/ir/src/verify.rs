@@ -121,6 +121,10 @@ pub enum Defect {
     Area(usize),
     /// A variable with an address from VAR_CONFIG that leaves the image, as its address does, or a bit that is no BOOL.
     Mapped(usize),
+    /// This retained variable leaves the image, or the switch of the start code does.
+    Retained(usize),
+    /// This variable with a copy per task leaves the image, overlaps another one, or names a task that the program does not have.
+    Latched(usize),
     /// A handler that does not begin with [`crate::Inst::Catch`], or one of these anywhere else.
     Handler,
 }
@@ -158,6 +162,10 @@ impl std::fmt::Display for Defect {
             Self::Heap => write!(f, "the heap leaves the image, overlaps a stack region or has no possible size"),
             Self::Area(n) => write!(f, "area {n} of direct addresses leaves the image"),
             Self::Mapped(n) => write!(f, "variable {n} of VAR_CONFIG leaves the image, or its bit is no BOOL"),
+            Self::Retained(n) => write!(f, "retained variable {n} leaves the image, or the switch of the start code does"),
+            Self::Latched(n) => {
+                write!(f, "variable {n} with a copy per task leaves the image, overlaps another one, or names a task that is missing")
+            }
             Self::Handler => write!(f, "a fault is caught where no handler begins, or a handler does not catch it"),
             Self::Resources => write!(f, "resources are not in rising order or leave the image"),
         }

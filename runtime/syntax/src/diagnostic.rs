@@ -132,6 +132,7 @@ codes! {
     W0310 MissingMember "a CASE leaves out members of its enumeration",
     W0311 TwoWriters "two tasks write the same variable",
     W0312 PointerType "a pointer gets the address of something of another type",
+    W0313 NotKept "what points elsewhere is not kept over a restart",
     W0320 SharedAddress "two variables lie at addresses that overlap",
     W0321 NoAddress "a variable waits for an address and gets none",
 }

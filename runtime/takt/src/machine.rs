@@ -211,9 +211,9 @@ impl Machine {
         self.engine.fault()
     }
 
-    /// Clears a fault and starts the program with its initial values.
-    pub fn reset(&mut self) -> Result<(), Box<FaultRecord>> {
-        self.engine.reset()
+    /// Clears a fault and starts the program again, with the values that this kind of restart keeps.
+    pub fn reset(&mut self, kind: takt_engine::Reset) -> Result<(), Box<FaultRecord>> {
+        self.engine.reset(kind)
     }
 
     /// The engine.

@@ -250,7 +250,7 @@ impl Walk<'_> {
 }
 
 /// The indices of the element with that number as they are written.
-fn indices(dims: &[(i64, i64)], number: u32) -> String {
+pub(crate) fn indices(dims: &[(i64, i64)], number: u32) -> String {
     let mut rest = u64::from(number);
     let mut parts: Vec<String> = Vec::new();
     for (low, high) in dims.iter().rev() {

@@ -22,6 +22,10 @@ struct Effects {
     writes: BTreeSet<Range>,
     /// Parameters behind which it reads and writes.
     params: HashMap<u32, (bool, bool)>,
+    /// What pointers, references and VAR_IN_OUT are made to.
+    pointed: BTreeSet<Range>,
+    /// Parameters to what is behind which they are made.
+    pointed_params: BTreeSet<u32>,
 }
 
 /// Where a local of a body points.
@@ -105,6 +109,28 @@ impl Compiler<'_> {
         }
     }
 
+    /// Finds the variables with `{attribute 'task_snapshot'}` and the tasks that write them, or may do so through a pointer that they make.
+    pub(crate) fn find_latched(&mut self) {
+        let marked = self.marked();
+        if marked.is_empty() || self.program.tasks.len() < 2 {
+            return;
+        }
+        let effects = all_effects(&self.program);
+        let graph = CallGraph::new(&self.program);
+        let reached: Vec<Vec<usize>> =
+            self.program.tasks.iter().map(|task| reached(&self.program, &graph, task.entry.0 as usize)).collect();
+        for (ty, offset) in marked {
+            let range = (offset, offset.saturating_add(self.types.size(ty)));
+            let writes = |body: &usize| {
+                let effects = &effects[*body];
+                !inside(&effects.writes, range).is_empty() || !inside(&effects.pointed, range).is_empty()
+            };
+            let writers = reached.iter().enumerate().filter(|(_, bodies)| bodies.iter().any(writes)).map(|(task, _)| task as u32);
+            let writers = writers.collect();
+            self.program.latched.push(takt_ir::Latched { ty, offset, writers });
+        }
+    }
+
     fn two_writers(&mut self, variable: &Shared, shares: &[Share]) -> bool {
         let clash = shares.iter().enumerate().find_map(|(i, a)| {
             let b = shares[i + 1..].iter().find(|b| b.task != a.task && overlap(&a.writes, &b.writes).next().is_some())?;
@@ -120,9 +146,13 @@ impl Compiler<'_> {
     }
 
     fn half_changed(&mut self, variable: &Shared, shares: &[Share]) {
+        let copied = |share: &Share| {
+            let latched = self.program.latched.iter().find(|l| l.offset == variable.range.0);
+            latched.is_some_and(|l| !l.writers.contains(&(share.task as u32)))
+        };
         let priority = |share: &Share| self.program.tasks[share.task].priority;
         let torn = shares.iter().find_map(|writer| {
-            let reader = shares.iter().find(|reader| {
+            let reader = shares.iter().filter(|reader| !copied(reader)).find(|reader| {
                 let common: BTreeSet<Range> = overlap(&writer.writes, &reader.reads).collect();
                 priority(reader) != priority(writer) && (common.len() > 1 || common.iter().any(|(start, end)| end - start > WORD))
             })?;
@@ -134,7 +164,8 @@ impl Compiler<'_> {
         let notes = vec![self.share_note(writer, "written"), self.share_note(reader, "read")];
         let diagnostic = self.report(Code::SharedData, variable.span, message);
         diagnostic.notes = notes;
-        diagnostic.help = Some("give both tasks the same priority, or hand the values over with a flag that is written last".into());
+        diagnostic.help =
+            Some("put {attribute 'task_snapshot'} before it, so that the reader sees a copy; or give both tasks the same priority".into());
     }
 
     fn task_name(&self, task: usize) -> String {
@@ -172,7 +203,7 @@ fn all_effects(program: &Program) -> Vec<Effects> {
             let body = &program.bodies[*i];
             let walk = Walk { body, all: &effects, targets: vec![None; body.locals.len()], found: Effects::default() };
             let found = walk.run();
-            changed |= cyclic && found.params != effects[*i].params;
+            changed |= cyclic && (&found.params, &found.pointed_params) != (&effects[*i].params, &effects[*i].pointed_params);
             effects[*i] = found;
         }
         if !changed {
@@ -235,6 +266,9 @@ impl Walk<'_> {
             }
             Inst::Address { dst, base, offset } | Inst::Pointer { dst, base, offset } => {
                 let len = self.extent(*dst);
+                if let Inst::Pointer { .. } = inst {
+                    self.lend(self.target(*base, *offset, len));
+                }
                 self.point(*dst, *base, *offset, len);
             }
             Inst::Index { dst, base, offset, low, high, stride, .. } => {
@@ -301,8 +335,20 @@ impl Walk<'_> {
 
     fn call(&mut self, body: usize, args: &[Local]) {
         for (param, arg) in args.iter().enumerate() {
+            if self.all.get(body).is_some_and(|effects| effects.pointed_params.contains(&(param as u32))) {
+                self.lend(self.get(*arg));
+            }
             let how = self.all.get(body).and_then(|effects| effects.params.get(&(param as u32))).copied();
             how.into_iter().for_each(|how| self.touch(*arg, how));
+        }
+    }
+
+    /// Somebody may write it later, wherever the pointer goes.
+    fn lend(&mut self, target: Option<Target>) {
+        match target {
+            Some(Target::Image(range)) => drop(self.found.pointed.insert(range)),
+            Some(Target::Param(param)) => drop(self.found.pointed_params.insert(param)),
+            None => {}
         }
     }
 

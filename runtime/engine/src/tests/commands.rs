@@ -114,7 +114,7 @@ fn a_halt_and_a_reset_are_commands() {
     steps(&mut engine, 1);
     engine.command(&Command::Halt).unwrap();
     assert_eq!(engine.fault().map(|record| record.fault), Some(Fault::Stopped));
-    engine.command(&Command::Reset).unwrap();
+    engine.command(&Command::Reset(Reset::Warm)).unwrap();
     steps(&mut engine, 1);
     assert!(engine.fault().is_none());
 }

@@ -58,7 +58,7 @@ fn so_many_slow_scans_in_a_row_are_the_watchdog_too() {
             }
             assert_eq!(fault(&engine), Some((Fault::Watchdog, "Main", 3)));
             assert_eq!(number(&engine, PROGRESS), 5000, "the scan itself went to its end");
-            engine.reset().unwrap();
+            engine.reset(Reset::Warm).unwrap();
             engine.step(engine.next_release());
             assert_eq!(fault(&engine), None, "a reset starts the count anew");
         },

@@ -27,6 +27,28 @@ pub(super) fn check(program: &Program) -> Result<(), Defect> {
         let bit = mapped.bit.is_none_or(|bit| bit < 8 && bool);
         ensure(bit && in_image(program, mapped.offset, size) && in_image(program, mapped.address, there), Defect::Mapped(i))?;
     }
+    for (i, retained) in program.retained.iter().enumerate() {
+        let size = u32::try_from(sizes.of(retained.ty, 0)?).map_err(|_| Defect::Retained(i))?;
+        ensure(in_image(program, retained.offset, size), Defect::Retained(i))?;
+    }
+    let switch = program.restart == 0 || in_image(program, program.restart, crate::retain::RESTART_BYTES);
+    ensure(switch, Defect::Retained(program.retained.len()))?;
+    for resource in &program.resources {
+        sizes.of(resource.ty, 0)?;
+    }
+    let mut taken: Vec<(u64, u64)> = Vec::new();
+    for (i, latched) in program.latched.iter().enumerate() {
+        let size = u32::try_from(sizes.of(latched.ty, 0)?).map_err(|_| Defect::Latched(i))?;
+        let tasks = latched.writers.iter().all(|task| (*task as usize) < program.tasks.len());
+        let (start, end) = (u64::from(latched.offset), u64::from(latched.offset) + u64::from(size));
+        let apart = taken.iter().all(|(s, e)| end <= *s || *e <= start);
+        let stacks = program.tasks.iter().all(|t| {
+            let (s, len) = (u64::from(t.stack.0), u64::from(t.stack.1));
+            len == 0 || end <= s || s + len <= start
+        });
+        ensure(tasks && apart && stacks && in_image(program, latched.offset, size), Defect::Latched(i))?;
+        taken.push((start, end));
+    }
     Ok(())
 }
 

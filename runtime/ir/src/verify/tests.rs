@@ -36,6 +36,24 @@ fn mismatch(expected: Ty, found: Ty) -> Defect {
 }
 
 #[test]
+fn what_is_kept_or_copied_stays_in_the_image() {
+    let task = "type INT type array 0 [0..99] task \"T\" cyclic 1 priority 0 entry 0 stack 128 64";
+    tables("retained \"x\" type 0 at 16 retain", Defect::Type(0));
+    for (line, expected) in [
+        ("retained \"x\" type 1 at 57 retain", Defect::Retained(0)),
+        ("retained \"x\" type 0 at 255 persistent", Defect::Retained(0)),
+        ("restart 15", Defect::Retained(0)),
+        ("restart 255", Defect::Retained(0)),
+        ("latched type 1 at 57 writers []", Defect::Latched(0)),
+        ("latched type 0 at 190 writers [0]", Defect::Latched(0)),
+        ("latched type 0 at 64 writers [0, 7]", Defect::Latched(0)),
+    ] {
+        tables(&format!("{task} {line}"), expected);
+    }
+    check(&format!("{task} retained \"x\" type 1 at 56 retain restart 254 latched type 0 at 126 writers [0]"), "i64", "", Ok(()));
+}
+
+#[test]
 fn the_sample_is_accepted() {
     assert_eq!(verify(&sample()), Ok(()));
 }
