@@ -12,6 +12,7 @@ use crate::limits::Alarm;
 use crate::load::Link;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned, execute};
+use crate::observe::Observer;
 use crate::options::{Clock, Preemption};
 use crate::retain::{Keeper, Reset, Restore};
 use crate::schedule::TaskState;
@@ -54,6 +55,7 @@ pub(crate) struct Core {
     pub depth_limit: u32,
     pub clock: Clock,
     pub alarm: Option<Box<dyn Alarm>>,
+    pub observer: Option<Box<dyn Observer>>,
     pub stopwatch: Option<fn() -> u64>,
     /// Sorted by task, scan, fuel (virtual clock).
     pub preempt: Vec<Preemption>,
@@ -171,6 +173,7 @@ impl Core {
             self.bus_outputs(now);
         }
         self.leave(index, outer);
+        self.observe(index, now);
     }
 
     fn enter(&mut self, index: usize, now: Time) -> Outer {

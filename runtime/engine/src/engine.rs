@@ -7,6 +7,7 @@ use crate::core::Core;
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::memory::execute;
+use crate::observe::Observer;
 use crate::options::Preemption;
 use crate::retain::{Reset, Restore, RetainLayout, SnapshotReader};
 use crate::statistics::TaskStatistics;
@@ -16,7 +17,7 @@ use takt_abi::{Fault, Time};
 use takt_ir::{Base, BodyId, Inst, Place, Program};
 
 /// Fuel of a condition.
-const CONDITION_FUEL: i64 = 100_000;
+pub(crate) const CONDITION_FUEL: i64 = 100_000;
 
 /// Stops a scan from another thread or a signal handler: at its next poll it ends with [`Fault::Stopped`].
 #[derive(Debug, Clone)]
@@ -212,6 +213,21 @@ impl Engine {
         self.range(place).map_or(&[], |range| &self.image()[range])
     }
 
+    /// From now on this observer looks at the program after each scan; the one before, if there was one.
+    pub fn observe(&mut self, observer: Option<Box<dyn Observer>>) -> Option<Box<dyn Observer>> {
+        std::mem::replace(&mut self.core.observer, observer)
+    }
+
+    /// Makes room for [`Engine::evaluate`], so that it allocates nothing later.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn prepare(&mut self, body: BodyId) {
+        if changes_image(&self.core.program, body) {
+            self.scratch.reserve(self.core.image.bytes().len());
+        }
+    }
+
     /// Runs a body without parameters in the interpreter and returns its result (a condition: 0 or 1). What it changes in the image is undone.
     ///
     /// # Panics
@@ -235,7 +251,7 @@ impl Engine {
 }
 
 /// Whether a body might write something that is not its own frame.
-fn changes_image(program: &Program, body: BodyId) -> bool {
+pub(crate) fn changes_image(program: &Program, body: BodyId) -> bool {
     let own = |base: &Base| matches!(base, Base::Frame);
     program.bodies[body.0 as usize].blocks.iter().flat_map(|b| &b.insts).any(|inst| match inst {
         Inst::Store { base, .. } => !own(base),

@@ -195,6 +195,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         fuel_limit: options.fuel_limit.min(i64::MAX as u64 / 2),
         clock: options.clock,
         alarm: options.alarm,
+        observer: None,
         stopwatch: options.stopwatch,
         preempt,
         recorded,

@@ -13,7 +13,7 @@ mod spelling;
 pub(crate) use spelling::closest;
 
 /// A named place in the image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Place {
     /// Offset into the image.
     pub offset: u32,

@@ -1,17 +1,28 @@
 //! The wall clock: the only place that asks what time it is.
 
+use crate::platform;
+use crate::realtime::system;
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
 use takt_abi::Time;
 
-fn origin() -> Instant {
-    static ORIGIN: OnceLock<Instant> = OnceLock::new();
-    *ORIGIN.get_or_init(Instant::now)
+/// Machine time 0 under the real clock, in nanoseconds of the system's monotonic clock.
+pub fn origin() -> u64 {
+    static ORIGIN: OnceLock<u64> = OnceLock::new();
+    *ORIGIN.get_or_init(system::monotonic)
 }
 
 /// Monotonic nanoseconds since the process first asked.
 pub fn nanoseconds() -> u64 {
-    origin().elapsed().as_nanos() as u64
+    let origin = origin();
+    system::monotonic() - origin
+}
+
+/// An alarm for the calling thread, on the scale of [`machine_time`]; `None` where the system has none to give.
+pub fn alarm() -> Option<Box<dyn takt_engine::Alarm>> {
+    #[cfg(target_os = "linux")]
+    return system::SignalAlarm::new(origin()).ok().map(|alarm| Box::new(alarm) as _);
+    #[cfg(not(target_os = "linux"))]
+    None
 }
 
 /// Monotonic time since the process first asked.
@@ -25,35 +36,51 @@ pub struct Pace {
     /// `None`: as fast as possible.
     factor: Option<f64>,
     start: Time,
+    spin: Time,
 }
 
 impl Pace {
     /// Starts now, at so many times real time.
     pub fn start(factor: Option<f64>) -> Self {
-        Self { factor, start: machine_time() }
+        Self { factor, start: machine_time(), spin: Time(0) }
+    }
+    /// Sleeping ends so long before the time comes; then the clock is looked at until it is there.
+    pub fn spinning(self, spin: Time) -> Self {
+        Self { spin, ..self }
     }
     /// Whether nothing is waited for.
     pub fn is_max(&self) -> bool {
         self.factor.is_none()
     }
-    /// Sleeps until the wall clock has reached a machine time; the time to step with. At real time it is the wall clock's.
+    /// Sleeps until the wall clock has reached a machine time, or a stop is asked for; the time to step with. At real time it is the wall clock's.
     pub fn wait(&self, release: Time) -> Time {
+        self.wait_unless(release, platform::stop_requested)
+    }
+    /// The same, and nothing ends the wait early.
+    pub fn wait_fully(&self, release: Time) -> Time {
+        self.wait_unless(release, || false)
+    }
+
+    fn wait_unless(&self, release: Time, stop: fn() -> bool) -> Time {
         let Some(factor) = self.factor else { return release };
         if factor == 1.0 {
             // Machine time is the wall clock's; the first release is now.
             if release > Time(0) {
-                sleep_until(release);
+                self.sleep_until(release, stop);
             }
-            return machine_time().max(release);
+            return machine_time();
         }
-        sleep_until(Time(self.start.0 + (release.0 as f64 / factor) as i64));
+        self.sleep_until(Time(self.start.0 + (release.0 as f64 / factor) as i64), stop);
         release
     }
-}
 
-fn sleep_until(time: Time) {
-    let left = time.0 - machine_time().0;
-    if left > 0 {
-        std::thread::sleep(Duration::from_nanos(left as u64));
+    fn sleep_until(&self, time: Time, stop: fn() -> bool) {
+        let wake = time.0.saturating_sub(self.spin.0);
+        while machine_time().0 < wake && !stop() {
+            system::sleep_until(origin().saturating_add_signed(wake));
+        }
+        while machine_time() < time && !stop() {
+            std::hint::spin_loop();
+        }
     }
 }

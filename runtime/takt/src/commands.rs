@@ -4,6 +4,7 @@ mod check;
 mod explain;
 mod import;
 mod live;
+mod outputs;
 mod run;
 mod summary;
 
@@ -78,6 +79,9 @@ pub struct RunArgs {
     /// Where the machine keeps its state. Default: .takt in the project's folder, in real time only.
     #[arg(long, value_name = "DIR")]
     pub state: Option<PathBuf>,
+    /// Writes the statistics of the tasks at the end.
+    #[arg(long, value_name = "FILE.json|csv")]
+    pub stats: Option<PathBuf>,
     /// One JSON object on standard output.
     #[arg(long)]
     pub json: bool,

@@ -6,6 +6,7 @@
 mod binding;
 mod bus;
 mod error;
+mod limits;
 mod operator;
 pub mod variable;
 
@@ -36,6 +37,9 @@ pub struct Setup {
     pub clock: Clock,
     /// Nanoseconds of some clock, for the statistics of execution times.
     pub stopwatch: Option<fn() -> u64>,
+    /// The calling thread is woken within a scan when a higher task is due or a watchdog strikes, under [`crate::clock::machine_time`]. Without it
+    /// scans look at the clock now and then.
+    pub alarm: bool,
     /// An ST condition that ends the run.
     pub until: Option<String>,
     /// Bytes of native stack that the calling thread keeps for compiled code. `None`: what an ordinary thread has.
@@ -95,10 +99,13 @@ impl Machine {
             wires: bound.wires,
             clock: setup.clock,
             stopwatch: setup.stopwatch,
+            task_limits: limits::limits(&project.manifest, &program),
+            alarm: setup.alarm.then(crate::clock::alarm).flatten(),
             ..ordinary
         };
         let (driver, bus) = bus.split();
-        let engine = takt_engine::load(program.clone(), options, driver).map_err(|error| load_error(project, error))?;
+        let mut engine = takt_engine::load(program.clone(), options, driver).map_err(|error| load_error(project, error))?;
+        compiled.conditions.iter().for_each(|body| engine.prepare(*body));
         let fastest = fastest_task(&program).unwrap_or(engine.bus_task());
         Ok(Self {
             fastest,
@@ -135,12 +142,12 @@ impl Machine {
         if self.engine.fault().is_some() {
             return Some(End::Fault);
         }
-        for (watch, end) in [(self.until.clone(), End::Until), (self.done.clone(), End::Done)] {
+        for (watch, end) in [(&self.until, End::Until), (&self.done, End::Done)] {
             let Some(watch) = watch else { continue };
             match self.engine.evaluate(watch.body) {
                 Ok(0) => {}
                 Ok(_) => return Some(end),
-                Err(fault) => return Some(End::Condition { text: watch.text, fault }),
+                Err(fault) => return Some(End::Condition { text: watch.text.clone(), fault }),
             }
         }
         if let Some((text, fault)) = self.operator.failed() {
@@ -246,6 +253,16 @@ impl Machine {
         self.done.is_some()
     }
 
+    /// The fastest task (index into [`Program::tasks`]).
+    pub fn fastest(&self) -> usize {
+        self.fastest
+    }
+
+    /// The condition of [`Machine::is_plotted`].
+    pub fn plot_condition(&self) -> Option<BodyId> {
+        self.plotted.as_ref().map(|watch| watch.body)
+    }
+
     /// Whether this scan belongs to the plot.
     pub fn is_plotted(&mut self) -> bool {
         let Some(watch) = &self.plotted else { return true };
@@ -348,6 +365,10 @@ fn load_error(project: &Project, error: LoadError) -> BuildError {
     let manifest = &project.manifest;
     let (span, message) = match &error {
         LoadError::BusTask { .. } => (manifest.bus_task.as_ref().map(|task| task.span.clone()), error.to_string()),
+        LoadError::TaskLimits { name, .. } => {
+            let task = manifest.tasks.iter().find(|task| task.name.value == *name);
+            (task.map(|task| task.name.span.clone()), error.to_string())
+        }
         LoadError::Axis { name, problem } => {
             (manifest.axes.iter().find(|axis| axis.name.value == *name).map(|axis| axis.name.span.clone()), problem.to_string())
         }

@@ -8,12 +8,14 @@ mod duration;
 mod error;
 mod number;
 mod reader;
+mod realtime;
 mod simulation;
 mod view;
 
 pub use axis::{Axis, Home, Lag, Limits, Switches};
 pub use duration::parse_duration;
 pub use error::{ManifestError, ManifestErrors, Place};
+pub use realtime::TaskSettings;
 pub use simulation::{AxisPlant, Operator, Setting, Sim, SimInput, Simulation, Step, Valve};
 pub use view::{Item, Plot};
 
@@ -79,6 +81,10 @@ pub struct Manifest {
     pub defines: Vec<(String, String)>,
     /// The task that owns the bus, if named.
     pub bus_task: Option<Located<String>>,
+    /// How the resource thread runs under the real clock.
+    pub realtime: crate::realtime::Settings,
+    /// Limits of tasks.
+    pub tasks: Vec<TaskSettings>,
     /// Axes in the order of the manifest.
     pub axes: Vec<Axis>,
     /// Wiring in the order of the manifest.
@@ -120,6 +126,8 @@ fn sections(root: &mut Table<'_, '_>, manifest: &mut Manifest) {
         table.choice("kind", &[("sim", ())]);
         manifest.bus_task = table.string("task");
     });
+    root.section("realtime", |table| manifest.realtime = realtime::read_realtime(table));
+    root.named_sections("task", |name, table| manifest.tasks.push(realtime::read_task(name, table)));
     root.named_sections("axis", |name, table| {
         if let Some(axis) = axis::read(name, table) {
             manifest.axes.push(axis);

@@ -9,7 +9,8 @@ mod path;
 mod scale;
 mod svg;
 
-use crate::machine::{Machine, PlotPlaces};
+use crate::machine::PlotPlaces;
+use crate::realtime::samples::Look;
 
 /// Samples kept at the most.
 const SAMPLES: usize = 400_000;
@@ -76,14 +77,20 @@ impl Recording {
         Self { places: places.clone(), data, stride: 1, scans: 0, count: f64::NAN }
     }
 
+    /// The variables that a sample needs.
+    pub fn places(&self) -> impl Iterator<Item = takt_ir::Place> {
+        let of = &self.places;
+        of.tcp.into_iter().flatten().chain(of.tool.into_iter().flatten()).chain(of.speed).chain(of.dots).chain(of.valve)
+    }
+
     /// Takes a sample.
-    pub fn add(&mut self, machine: &Machine) {
-        let at = |place: Option<takt_ir::Place>| place.map_or(f64::NAN, |place| machine.number_at(place));
+    pub fn add(&mut self, machine: &impl Look) {
+        let at = |place: Option<takt_ir::Place>| place.map_or(f64::NAN, |place| machine.number(place));
         let sample = Sample {
-            time: machine.now().seconds(),
-            tcp: self.places.tcp.map_or([f64::NAN; 3], |places| places.map(|place| machine.number_at(place))),
+            time: machine.time().seconds(),
+            tcp: self.places.tcp.map_or([f64::NAN; 3], |places| places.map(|place| machine.number(place))),
             speed: at(self.places.speed),
-            tool: self.places.tool.map_or([f64::NAN; 2], |places| places.map(|place| machine.number_at(place))),
+            tool: self.places.tool.map_or([f64::NAN; 2], |places| places.map(|place| machine.number(place))),
             valve: at(self.places.valve),
         };
         let count = at(self.places.dots);

@@ -216,3 +216,31 @@ fn statistics_start_anew_and_the_scans_keep_their_numbers() {
         },
     );
 }
+
+#[test]
+fn an_observer_sees_each_scan_those_within_others_too() {
+    type Seen = Vec<(usize, i32, Option<u64>)>;
+    struct Look(Rc<RefCell<Seen>>);
+    impl Observer for Look {
+        fn scanned(&mut self, scan: &mut Scanned<'_>) {
+            let progress = i32::from_le_bytes(scan.read(place(PROGRESS, 1)).try_into().unwrap());
+            let condition = scan.evaluate(BodyId(2)).map(Result::unwrap);
+            assert_eq!(scan.read(place(4095, 1)), []);
+            self.0.borrow_mut().push((scan.task(), progress, condition));
+        }
+    }
+    let condition = format!(
+        "body \"C\" () -> i64 frame 0 @1\n  local i64, i64\nb0:\n  v0 = load.i32 image+{PROGRESS}\n  v1 = const 50\n  v0 = lt v1, v0\n  return v0\n"
+    );
+    let text = format!("{}{condition}", two_tasks(&mark("A", "v0 = const 1"), &long("B", 100)));
+    let options = || Options { preempt: vec![Preemption { cycle: 1, task: 1, at_fuel: 40 }], ..Options::default() };
+    both(&text, options, |mut engine| {
+        let seen = Rc::new(RefCell::new(Seen::new()));
+        assert!(engine.observe(Some(Box::new(Look(seen.clone())))).is_none());
+        engine.step(Time(0));
+        assert_eq!(*seen.borrow(), [(0, 0, Some(0)), (0, 40, Some(0)), (1, 100, Some(1))]);
+        engine.observe(None);
+        engine.step(engine.next_release());
+        assert_eq!(seen.borrow().len(), 3);
+    });
+}

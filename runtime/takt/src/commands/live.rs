@@ -1,7 +1,8 @@
 //! The live line: what the manifest wants shown, on one line of the terminal, ten times a second.
 
 use crate::clock;
-use crate::machine::Machine;
+use crate::machine::Shown;
+use crate::realtime::samples::Look;
 use crate::values;
 use std::io::{IsTerminal, Write};
 
@@ -10,6 +11,7 @@ const PERIOD: u64 = 100_000_000;
 
 /// The line, if standard error is a terminal.
 pub(super) struct Live {
+    items: Vec<Shown>,
     on: bool,
     next: u64,
     shown: bool,
@@ -17,12 +19,22 @@ pub(super) struct Live {
 }
 
 impl Live {
-    pub(super) fn new(wanted: bool) -> Self {
-        Self { on: wanted && std::io::stderr().is_terminal(), next: 0, shown: false, looks: 0 }
+    pub(super) fn new(wanted: bool, items: &[Shown]) -> Self {
+        Self { items: items.to_vec(), on: wanted && std::io::stderr().is_terminal(), next: 0, shown: false, looks: 0 }
+    }
+
+    /// Whether there is a terminal.
+    pub(super) fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// The variables that it shows.
+    pub(super) fn places(&self) -> impl Iterator<Item = takt_ir::Place> {
+        self.items.iter().map(|shown| shown.place)
     }
 
     /// Draws the line anew when it is time. The clock is asked every 16th scan only.
-    pub(super) fn show(&mut self, machine: &Machine) {
+    pub(super) fn show(&mut self, machine: &impl Look) {
         self.looks = self.looks.wrapping_add(1);
         if !self.on || self.looks % 16 != 1 {
             return;
@@ -36,7 +48,8 @@ impl Live {
         let colour = anstream::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let (dim, plain) = if colour { ("\x1b[2m", "\x1b[0m") } else { ("", "") };
         // A terminal that cannot be written to is no reason to stop a machine.
-        let _ = write!(std::io::stderr(), "\r\x1b[K{dim}{:>9.3} s{plain}  {}", machine.now().seconds(), line(machine, width()));
+        let _ =
+            write!(std::io::stderr(), "\r\x1b[K{dim}{:>9.3} s{plain}  {}", machine.time().seconds(), line(&self.items, machine, width()));
         let _ = std::io::stderr().flush();
     }
 
@@ -54,10 +67,10 @@ fn width() -> usize {
     columns.saturating_sub(15).max(20)
 }
 
-fn line(machine: &Machine, width: usize) -> String {
-    let types = &machine.program().types;
-    let items = machine.view().live.iter().map(|shown| {
-        let value = values::for_people(types, shown.place, machine.bytes(shown.place), shown.item.digits, shown.item.scale);
+fn line(items: &[Shown], machine: &impl Look, width: usize) -> String {
+    let types = machine.types();
+    let items = items.iter().map(|shown| {
+        let value = values::for_people(types, shown.place, machine.look(shown.place), shown.item.digits, shown.item.scale);
         [shown.item.label.as_str(), &value, shown.item.unit.as_str()]
             .into_iter()
             .filter(|part| !part.is_empty())

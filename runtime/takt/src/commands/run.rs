@@ -1,18 +1,15 @@
 //! `takt run`: runs a program until it is over.
 
-use super::{EngineKind, Exit, Format, RunArgs, Speed, check, live::Live, summary};
+use super::outputs::{Outputs, Writer, warning};
+use super::{EngineKind, Exit, Format, RunArgs, Speed, check, summary};
 use crate::clock::{self, Pace};
 use crate::console;
 use crate::language::{self, Word};
 use crate::machine::{BuildError, End, Machine, Setup};
-use crate::plot::Recording;
 use crate::project::{self, Project};
+use crate::realtime::{Held, system};
 use crate::sources::Sources;
-use crate::trace::{self, Trace};
 use crate::{messages, platform, state};
-use std::fs::File;
-use std::io::Write;
-use std::path::Path;
 use takt_abi::Time;
 use takt_engine::{Clock, ExecutorKind};
 use takt_ir::Place;
@@ -47,17 +44,38 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         machine.set(variable, value).map_err(|error| usage(&format!("--set {variable}: {error}")))?;
     }
     let printed = places(&machine, &args.print, "--print")?;
-    let mut outputs = Outputs::open(args, &machine)?;
+    let stats = args.stats.as_deref().map(|path| summary::statistics_file(path).map_err(|error| usage(&error))).transpose()?;
+    let outputs = Outputs::open(args, &machine)?;
+    let mut writer = Writer::start(outputs, &mut machine, real)?;
+    platform::listen_for_stop();
+    let settings = project.manifest.realtime;
+    let held = real.then(|| Held::hold(settings, machine.engine().native_stack()));
+    held.iter().for_each(tell_missing);
+    let before = system::disturbances();
     let started = clock::nanoseconds();
-    let over = turn(args, &mut machine, speed, &mut outputs);
+    let pace = Pace::start(match speed {
+        Speed::Max => None,
+        Speed::Factor(factor) => Some(factor),
+    });
+    let pace = if real { pace.spinning(settings.spin) } else { pace };
+    let over = turn(args, &mut machine, &pace, |machine| writer.scanned(machine));
     let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
-    outputs.finish(args)?;
+    let disturbances = held.as_ref().map(|_| system::disturbances().since(before));
+    drop(held);
+    let lost = writer.finish(&mut machine, args)?;
+    let thread = disturbances.map(|disturbances| summary::Thread { disturbances, lost });
+    if let Some(format) = stats {
+        format.write(&mut machine, thread.as_ref()).map_err(|error| usage(&error))?;
+    }
     if args.json {
-        console::result(summary::to_json(&machine, &printed));
+        console::result(summary::to_json(&mut machine, &printed, thread.as_ref()));
     } else {
         printed.iter().for_each(|(name, place)| console::result(format_args!("{name} = {}", literal(&machine, *place))));
     }
     summary::tell(&project, &machine, &over, (!args.json).then_some(wall));
+    if real && !args.json {
+        summary::tell_tasks(&mut machine);
+    }
     let bad = matches!(over, Over::End(End::Fault | End::TimedOut { .. } | End::Condition { .. }));
     Ok(if bad { Exit::Findings } else { Exit::Good })
 }
@@ -81,6 +99,7 @@ fn build(args: &RunArgs, project: &Project, speed: Speed) -> Result<Machine, Exi
     let setup = Setup {
         executor,
         clock,
+        alarm: matches!(clock, Clock::Real(_)),
         stopwatch: Some(clock::nanoseconds),
         until: args.until.clone(),
         native_stack: Some(crate::machine::NATIVE_STACK),
@@ -110,12 +129,25 @@ fn refuse(error: &BuildError) -> Exit {
     }
 }
 
-fn usage(message: &str) -> Exit {
+/// Says in one warning what the resource thread could not get, and how to grant it.
+fn tell_missing(held: &Held) {
+    if held.missing.is_empty() {
+        return;
+    }
+    let language = language::of_environment();
+    console::tell(format_args!("{}: {}:", warning(), Word::NotRealTime.text(language)));
+    for missing in &held.missing {
+        console::tell(format_args!("  {}: {}", missing.what.text(language), missing.error));
+    }
+    console::tell(format_args!("  {}", Word::HowToGrant.text(language)));
+}
+
+pub(super) fn usage(message: &str) -> Exit {
     console::tell(format_args!("{}: {message}", Word::Error.text(language::of_environment())));
     Exit::Usage
 }
 
-fn places(machine: &Machine, names: &[String], option: &str) -> Result<Vec<(String, Place)>, Exit> {
+pub(super) fn places(machine: &Machine, names: &[String], option: &str) -> Result<Vec<(String, Place)>, Exit> {
     let place = |name: &String| match machine.place(name) {
         Ok(place) => Ok((name.clone(), place)),
         Err(error) => Err(usage(&format!("{option}: {error}"))),
@@ -127,75 +159,8 @@ fn literal(machine: &Machine, place: Place) -> String {
     takt_ir::format_value(&machine.program().types, place.ty, machine.bytes(place))
 }
 
-/// What is written while it runs.
-struct Outputs {
-    trace: Option<(Trace, Vec<Place>)>,
-    plot: Option<(Recording, File)>,
-    live: Live,
-    failed: Option<std::io::Error>,
-}
-
-impl Outputs {
-    fn open(args: &RunArgs, machine: &Machine) -> Result<Self, Exit> {
-        let trace = match &args.trace {
-            Some(path) => {
-                let places = places(machine, &args.record, "--record")?;
-                let file = trace::create(path, &args.record).map_err(|error| cannot_write(path, &error))?;
-                Some((file, places.into_iter().map(|(_, place)| place).collect()))
-            }
-            None => None,
-        };
-        let plot = match (&args.plot, &machine.view().plot) {
-            (None, _) => None,
-            (Some(path), Some(places)) => Some((Recording::new(places), File::create(path).map_err(|error| cannot_write(path, &error))?)),
-            (Some(_), None) => return Err(usage("--plot: the manifest has no [plot]; docs/manifest.md shows one")),
-        };
-        Ok(Self { trace, plot, live: Live::new(!args.json), failed: None })
-    }
-
-    /// After a scan of the fastest task.
-    fn scanned(&mut self, machine: &mut Machine) {
-        if let Some((trace, places)) = &mut self.trace {
-            let values: Vec<String> = places.iter().map(|place| literal(machine, *place)).collect();
-            if let Err(error) = trace.row(machine.now(), values) {
-                self.failed.get_or_insert(error);
-            }
-        }
-        if let Some((plot, _)) = &mut self.plot
-            && machine.is_plotted()
-        {
-            plot.add(machine);
-        }
-        self.live.show(machine);
-    }
-
-    fn finish(&mut self, args: &RunArgs) -> Result<(), Exit> {
-        self.live.clear();
-        let language = language::of_environment();
-        if let (Some((trace, _)), Some(path)) = (self.trace.take(), &args.trace) {
-            let failed = self.failed.take().map_or_else(|| trace.finish(), Err);
-            failed.map_err(|error| cannot_write(path, &error))?;
-            console::tell(format_args!("{}: {}", Word::TraceWritten.text(language), path.display()));
-        }
-        if let (Some((plot, mut file)), Some(path)) = (self.plot.take(), &args.plot) {
-            file.write_all(plot.draw().as_bytes()).map_err(|error| cannot_write(path, &error))?;
-            console::tell(format_args!("{}: {}", Word::PlotWritten.text(language), path.display()));
-        }
-        Ok(())
-    }
-}
-
-fn cannot_write(path: &Path, error: &std::io::Error) -> Exit {
-    usage(&format!("{} cannot be written: {error}", path.display()))
-}
-
-/// Steps until something ends the run.
-fn turn(args: &RunArgs, machine: &mut Machine, speed: Speed, outputs: &mut Outputs) -> Over {
-    platform::listen_for_stop();
-    let pace = Pace::start(match speed {
-        Speed::Max => None,
-        Speed::Factor(factor) => Some(factor),
-    });
+/// Steps until something ends the run; `seen` looks at the machine after each scan of the fastest task. Nothing here allocates.
+fn turn(args: &RunArgs, machine: &mut Machine, pace: &Pace, mut seen: impl FnMut(&mut Machine)) -> Over {
     loop {
         if args.cycles.is_some_and(|cycles| machine.cycles() >= cycles) {
             return Over::Cycles;
@@ -203,17 +168,17 @@ fn turn(args: &RunArgs, machine: &mut Machine, speed: Speed, outputs: &mut Outpu
         if args.duration.is_some_and(|duration| machine.elapsed() >= duration) {
             return Over::Duration;
         }
+        let now = pace.wait(machine.engine().next_release());
         if platform::stop_requested() {
-            rest(machine, &pace);
+            rest(machine, pace);
             return Over::Stopped;
         }
-        let now = pace.wait(machine.engine().next_release());
         if machine.step_at(now) {
-            outputs.scanned(machine);
+            seen(machine);
         }
         if let Some(end) = machine.ended() {
             if !pace.is_max() {
-                rest(machine, &pace);
+                rest(machine, pace);
             }
             return Over::End(end);
         }
@@ -231,7 +196,7 @@ fn rest(machine: &mut Machine, pace: &Pace) {
     }
     let end = Time(engine.now().0.saturating_add(REST.0));
     loop {
-        let now = pace.wait(engine.next_release());
+        let now = pace.wait_fully(engine.next_release());
         engine.step(now);
         if engine.at_rest() || now >= end {
             return;

@@ -5,13 +5,71 @@ use crate::console;
 use crate::language::{self, Language, Word};
 use crate::machine::{End, Machine};
 use crate::project::Project;
-use crate::values;
+use crate::realtime::Disturbances;
+use crate::{statistics, values};
 use serde_json::{Value, json};
+use std::path::Path;
 use takt_engine::{FaultRecord, Frame};
 use takt_ir::Place;
 
+/// What is known of the resource thread at the end of a run under the real clock.
+pub(super) struct Thread {
+    /// What the system did to it, from the first scan on.
+    pub(super) disturbances: Disturbances,
+    /// Samples that found their queue full.
+    pub(super) lost: u64,
+}
+
+impl Thread {
+    fn to_json(&self) -> Value {
+        let Disturbances { minor_faults, major_faults, waits, preempted } = self.disturbances;
+        json!({ "minor_faults": minor_faults, "major_faults": major_faults, "waits": waits, "preempted": preempted, "samples_lost": self.lost })
+    }
+}
+
+/// The file of `--stats`.
+pub(super) struct StatisticsFile<'p> {
+    path: &'p Path,
+    csv: bool,
+}
+
+/// The file of `--stats`, if its name says in which form.
+pub(super) fn statistics_file(path: &Path) -> Result<StatisticsFile<'_>, String> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("json") => Ok(StatisticsFile { path, csv: false }),
+        Some("csv") => Ok(StatisticsFile { path, csv: true }),
+        _ => Err(format!("--stats: the file must end in .json or .csv, found {}", path.display())),
+    }
+}
+
+impl StatisticsFile<'_> {
+    /// Writes the statistics of the tasks.
+    pub(super) fn write(&self, machine: &mut Machine, thread: Option<&Thread>) -> Result<(), String> {
+        let program = machine.program().clone();
+        let text = if self.csv {
+            statistics::to_csv(&program, machine.engine())
+        } else {
+            let tasks = statistics::to_json(&program, machine.engine());
+            let object = json!({ "schema": 1, "tasks": tasks, "thread": thread.map(Thread::to_json) });
+            format!("{object:#}\n")
+        };
+        std::fs::write(self.path, text).map_err(|error| format!("{} cannot be written: {error}", self.path.display()))?;
+        console::tell(format_args!("{}: {}", Word::StatisticsWritten.text(language::of_environment()), self.path.display()));
+        Ok(())
+    }
+}
+
+/// The tasks, one line each.
+pub(super) fn tell_tasks(machine: &mut Machine) {
+    let language = language::of_environment();
+    console::tell(format_args!("\x1b[1m{}\x1b[0m", Word::Tasks.text(language)));
+    statistics::lines(machine, language).iter().for_each(console::tell);
+}
+
 /// The object of `--json` (DESIGN §9).
-pub(super) fn to_json(machine: &Machine, printed: &[(String, Place)]) -> Value {
+pub(super) fn to_json(machine: &mut Machine, printed: &[(String, Place)], thread: Option<&Thread>) -> Value {
+    let program = machine.program().clone();
+    let tasks = statistics::to_json(&program, machine.engine());
     let times = &machine.statistics().scan_ns;
     let types = &machine.program().types;
     let values: serde_json::Map<String, Value> =
@@ -23,6 +81,8 @@ pub(super) fn to_json(machine: &Machine, printed: &[(String, Place)]) -> Value {
         "scan_ns": { "mean": times.mean().round() as u64, "p50": times.percentile(0.5), "p99": times.percentile(0.99), "max": times.max() },
         "fault": machine.fault().filter(|record| record.fault != takt_abi::Fault::Stopped).map(fault),
         "values": values,
+        "tasks": tasks,
+        "thread": thread.map(Thread::to_json),
     })
 }
 
@@ -118,19 +178,27 @@ mod tests {
 
     #[test]
     fn json_has_the_shape_of_the_contract() {
-        let machine = run("PROGRAM p VAR x : INT; END_VAR x := x + 2; END_PROGRAM", 3);
+        let mut machine = run("PROGRAM p VAR x : INT; END_VAR x := x + 2; END_PROGRAM", 3);
         let place = machine.place("p.x").unwrap();
-        let json = to_json(&machine, &[("p.x".into(), place)]);
+        let json = to_json(&mut machine, &[("p.x".into(), place)], None);
         let scan_ns = json!({ "mean": 0, "p50": 0, "p99": 0, "max": 0 });
-        let expected =
-            json!({ "schema": 1, "cycles": 3, "time_ns": 30_000_000, "scan_ns": scan_ns, "fault": null, "values": { "p.x": 6 } });
+        let none = json!({ "last": 0, "mean": 0, "min": 0, "max": 0, "p50": 0, "p99": 0 });
+        let name = &machine.program().tasks[0].name;
+        let task = json!({
+            "name": name, "state": "running", "kind": "cyclic", "interval_ns": 10_000_000, "priority": json["tasks"][0]["priority"], "cycles": 3,
+            "overruns": 0, "preempted": 0, "fuel_max": 0, "scan_ns": none, "jitter_ns": { "p50": 0, "p99": 0, "max": 0 },
+        });
+        let expected = json!({
+            "schema": 1, "cycles": 3, "time_ns": 30_000_000, "scan_ns": scan_ns, "fault": null, "values": { "p.x": 6 },
+            "tasks": [task], "thread": null,
+        });
         assert_eq!(json, expected);
     }
 
     #[test]
     fn a_fault_is_an_object_with_its_place() {
-        let machine = run("PROGRAM p\nVAR a, b : INT; END_VAR\na := a / b;\nEND_PROGRAM", 1);
-        let fault = &to_json(&machine, &[])["fault"];
+        let mut machine = run("PROGRAM p\nVAR a, b : INT; END_VAR\na := a / b;\nEND_PROGRAM", 1);
+        let fault = &to_json(&mut machine, &[], None)["fault"];
         let expected = json!({ "code": "division-by-zero", "message": "integer division by zero", "file": "main.st", "line": 3, "task": fault["task"], "stack": fault["stack"] });
         assert_eq!(fault, &expected);
         assert!(fault["task"].is_string() && fault["stack"].is_array());

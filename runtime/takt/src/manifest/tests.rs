@@ -1,6 +1,7 @@
 //! The table of mistakes: each says its line, what is wrong and what to do.
 
 use super::*;
+use takt_abi::Time;
 
 const AXIS: &str =
     "[axis.A]\nincrements-per-unit = \"1000 * 2\"\nlimits = { negative = -1.0, positive = 1.0, velocity = 1.0, acceleration = 2.0 }\n";
@@ -89,4 +90,24 @@ fn a_step_of_the_operator_is_read() {
     let values: Vec<_> = simulation.operator[0].set.iter().map(|s| (s.variable.value.as_str(), s.value.value.as_str())).collect();
     assert_eq!(values, [("GVL.On", "TRUE"), ("x", "T#1s"), ("y", "16#1F")]);
     assert_eq!(simulation.operator[0].inputs[0].value, 0.0);
+}
+
+#[test]
+fn the_resource_thread_and_the_limits_of_tasks_are_read() {
+    let manifest = read("takt.toml", "[realtime]\npriority = 0\ncpu = 3\nspin = \"50us\"\nlock-memory = false\n[task.Motion]\nwatchdog = \"5ms\"\nsensitivity = 2\nmax-overruns = 10\n[task.Slow]").unwrap();
+    let realtime = manifest.realtime;
+    assert_eq!((realtime.priority, realtime.cpu, realtime.spin, realtime.lock_memory), (0, Some(3), Time(50_000), false));
+    assert!(realtime.stay_awake);
+    let [motion, slow] = &manifest.tasks[..] else { panic!("{:?}", manifest.tasks) };
+    assert_eq!((motion.watchdog, motion.sensitivity, motion.max_overruns), (Some(Time::from_millis(5)), Some(2), Some(10)));
+    assert_eq!((slow.name.value.as_str(), slow.watchdog), ("Slow", None));
+}
+
+#[test]
+fn nonsense_about_time_is_refused_with_its_place() {
+    let text = "[realtime]\npriority = 99\ncpu = 1.5\nspin = \"2ms\"\nspn = 1\n[task.Motion]\nwatchdog = 5\n";
+    let errors = read("takt.toml", text).unwrap_err().to_string();
+    for part in ["2:12", "from 0 to 98, found 99", "whole number, found 1.5", "`spin`", "at most 1ms", "`spn`", "7:12", "a duration"] {
+        assert!(errors.contains(part), "{part}: {errors}");
+    }
 }
