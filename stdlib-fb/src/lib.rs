@@ -8,7 +8,10 @@ pub mod file;
 pub mod motion;
 pub mod standard;
 
-use takt_abi::{AxisRef, AxisState, BlockDesc, BufferMode, ControllerMode, Direction, EnumDesc, FnDesc, Library, SmcError, StructDesc};
+use takt_abi::{
+    AppInfo, AxisRef, AxisState, BlockDesc, BufferMode, ControllerMode, Direction, EnumDesc, FnDesc, Library, SmcError, StructDesc,
+    TaskInfo,
+};
 
 /// Everything that a program may use without declaring it.
 pub static LIBRARY: Library = Library {
@@ -24,6 +27,11 @@ pub static LIBRARY: Library = Library {
         ("edges.st", include_str!("../st/edges.st")),
         ("latches.st", include_str!("../st/latches.st")),
         ("system.st", include_str!("../st/system.st")),
+        ("tc2_files.st", include_str!("../st/tc2_files.st")),
+        ("tc2_format.st", include_str!("../st/tc2_format.st")),
+        ("tc2_ring.st", include_str!("../st/tc2_ring.st")),
+        ("tc2_strings.st", include_str!("../st/tc2_strings.st")),
+        ("tc2_system.st", include_str!("../st/tc2_system.st")),
         ("timers.st", include_str!("../st/timers.st")),
         ("types.st", include_str!("../st/types.st")),
         ("util_bits.st", include_str!("../st/util_bits.st")),
@@ -36,7 +44,7 @@ pub static LIBRARY: Library = Library {
 };
 
 /// The types that `takt-abi` itself declares, because the engine reads them too.
-const SHARED_STRUCTS: &[&StructDesc] = &[AxisRef::DESC];
+const SHARED_STRUCTS: &[&StructDesc] = &[AppInfo::DESC, AxisRef::DESC, TaskInfo::DESC];
 const SHARED_ENUMS: &[&EnumDesc] = &[AxisState::DESC, Direction::DESC, BufferMode::DESC, ControllerMode::DESC, SmcError::DESC];
 const SHARED_ALIASES: &[(&str, &str)] = &[
     ("AXIS_REF", "AXIS_REF_SM3"),
@@ -49,6 +57,8 @@ const SHARED_ALIASES: &[(&str, &str)] = &[
     ("Tc2_System", "Takt"),
     ("Tc2_Utilities", "Takt"),
     ("Tc2_Math", "Takt"),
+    ("Tc2_EtherCAT", "Takt"),
+    ("IBaseLibrary", "Takt"),
     ("SM3_Basic", "Takt"),
     ("SM3_CNC", "Takt"),
     ("__SYSTEM", "Takt"),
@@ -58,6 +68,7 @@ const BLOCK_TABLES: &[&[&BlockDesc]] = &[cnc::BLOCKS, file::BLOCKS, motion::BLOC
 const FUNCTION_TABLES: &[&[&FnDesc]] = &[
     cnc::FUNCTIONS,
     motion::FUNCTIONS,
+    standard::arguments::FUNCTIONS,
     standard::clock::FUNCTIONS,
     standard::date::FUNCTIONS,
     standard::decimal::FUNCTIONS,
@@ -65,6 +76,7 @@ const FUNCTION_TABLES: &[&[&FnDesc]] = &[
     standard::memory::FUNCTIONS,
     standard::number::FUNCTIONS,
     standard::parse::FUNCTIONS,
+    standard::report::FUNCTIONS,
     standard::text::FUNCTIONS,
 ];
 const ALIAS_TABLES: &[&[(&str, &str)]] = &[SHARED_ALIASES, cnc::ALIASES, file::ALIASES, motion::ALIASES, standard::memory::ALIASES];

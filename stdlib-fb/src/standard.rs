@@ -2,6 +2,7 @@
 //!
 //! The compiler calls some of them for its overloaded functions: `LEN` of a WSTRING is `WLEN`, `INT_TO_STRING` is `LINT_TO_STRING`.
 
+pub mod arguments;
 pub mod clock;
 pub mod counters;
 pub mod date;
@@ -10,6 +11,7 @@ pub mod format;
 pub mod memory;
 pub mod number;
 pub mod parse;
+pub mod report;
 pub mod text;
 
 use takt_abi::{Str, WStr};

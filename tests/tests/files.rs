@@ -271,3 +271,52 @@ END_PROGRAM";
     assert_eq!(values, ["TRUE", "FILE_ERROR.ABORT", "TRUE"]);
     assert_eq!(project.text("a"), "HGFE");
 }
+
+const LINES: &str = "
+PROGRAM main
+VAR
+    state : INT; h, bad : UINT; err, missing, outside : UDINT; op : FB_FileOpen; cl : FB_FileClose; put : FB_FilePuts; get : FB_FileGets; wr : FB_FileWrite;
+    sk : FB_FileSeek; tl : FB_FileTell; ef : FB_EOF; rn : FB_FileRename; rm : FB_FileDelete; dir : FB_CreateDir;
+    one, two, three : STRING; told, back : DINT; bytes : ARRAY[0..2] OF BYTE := [16#41, 16#42, 10]; ended : BOOL; lines : INT;
+END_VAR
+CASE state OF
+0: dir(sPathName := 'logs', bExecute := TRUE); IF NOT dir.bBusy THEN state := 1; END_IF
+1: op(sPathName := 'logs/a.txt', nMode := FOPEN_MODEWRITE OR FOPEN_MODEPLUS OR FOPEN_MODETEXT, bExecute := TRUE);
+   IF NOT op.bBusy THEN h := op.hFile; err := op.nErrId; op(bExecute := FALSE); state := 2; END_IF
+2: put(hFile := h, sLine := 'first$Nsecond$N', bExecute := TRUE); IF NOT put.bBusy THEN put(bExecute := FALSE); state := 3; END_IF
+3: wr(hFile := h, pWriteBuff := ADR(bytes), cbWriteLen := 3, bExecute := TRUE); IF NOT wr.bBusy THEN state := 4; END_IF
+4: tl(hFile := h, bExecute := TRUE); told := tl.nSeekPos; tl(bExecute := FALSE);
+   sk(hFile := h, nSeekPos := -3, eOrigin := E_SeekOrigin.SEEK_END, bExecute := TRUE);
+   IF NOT sk.bBusy THEN sk(bExecute := FALSE); tl(hFile := h, bExecute := TRUE); back := tl.nSeekPos; state := 5; END_IF
+5: get(hFile := h, bExecute := TRUE); IF NOT get.bBusy THEN three := get.sLine; get(bExecute := FALSE); state := 6; END_IF
+6: ef(hFile := h, bExecute := TRUE); IF NOT ef.bBusy THEN ended := ef.bEOF; ef(bExecute := FALSE); sk(hFile := h, nSeekPos := 0, eOrigin := E_SeekOrigin.SEEK_SET, bExecute := TRUE); state := 7; END_IF
+7: get(hFile := h, bExecute := TRUE);
+   IF NOT get.bBusy THEN IF lines = 0 THEN one := get.sLine; ELSIF lines = 1 THEN two := get.sLine; END_IF get(bExecute := FALSE); IF get.bEOF THEN state := 8; ELSE lines := lines + 1; END_IF END_IF
+8: cl(hFile := h, bExecute := TRUE); cl(bExecute := FALSE); put(hFile := h, bExecute := TRUE); bad := UDINT_TO_UINT(put.nErrId); state := 9;
+9: rn(sOldName := 'logs/a.txt', sNewName := 'logs/b.txt', bExecute := TRUE); IF NOT rn.bBusy THEN state := 10; END_IF
+10: rm(sPathName := 'logs/a.txt', bExecute := TRUE); IF NOT rm.bBusy THEN missing := rm.nErrId; rm(bExecute := FALSE); state := 11; END_IF
+11: op(sPathName := 'C:/x.txt', nMode := FOPEN_MODEREAD, bExecute := TRUE); IF NOT op.bBusy THEN outside := op.nErrId; state := 12; END_IF
+END_CASE
+END_PROGRAM";
+
+#[test]
+fn the_blocks_of_twincat_work_on_the_same_files() {
+    let paths = [
+        "main.state",
+        "main.err",
+        "main.at",
+        "main.back",
+        "main.one",
+        "main.two",
+        "main.three",
+        "main.ended",
+        "main.lines",
+        "main.bad",
+        "main.missing",
+    ];
+    let (values, project) = run("twincat", LINES, 60, &paths, |_| {});
+    assert_eq!(values, ["12", "0", "16", "13", "'first$N'", "'second$N'", "'AB$N'", "TRUE", "3", "1803", "1804"]);
+    assert_eq!(project.text("logs/b.txt"), "first\nsecond\nAB\n");
+    let (values, _) = run("twincat-outside", LINES, 60, &["main.outside"], |_| {});
+    assert_ne!(values, ["0"], "an absolute path is refused");
+}

@@ -6,6 +6,7 @@ use crate::heap::Heap;
 use crate::host::Host;
 use crate::plain::{OpenArray, Plain, Ptr};
 use crate::resource::Resources;
+use crate::system::Messages;
 use crate::{Handle, Time};
 use std::sync::atomic::AtomicU32;
 
@@ -125,6 +126,8 @@ pub struct Env {
     pub classes: Classes,
     /// What `__NEW` gives.
     pub heap: Heap,
+    /// What the program says to people.
+    pub messages: Messages,
 }
 
 impl Env {
@@ -141,6 +144,7 @@ impl Env {
             host,
             classes: Classes::default(),
             heap: Heap::default(),
+            messages: Messages::default(),
         }
     }
 }

@@ -17,6 +17,7 @@ mod heap;
 mod host;
 mod plain;
 mod resource;
+mod system;
 
 pub use axis::{AxisRef, AxisState, BufferMode, ControllerMode, Direction, SmcError};
 pub use block::{Arg, run_block, run_function};
@@ -31,6 +32,7 @@ pub use plain::{
     StTime, StTimeOfDay, StWchar, Str, WStr, Word,
 };
 pub use resource::{Handle, Resource, Resources};
+pub use system::{AppInfo, Message, MessageLevel, Messages, TaskInfo};
 
 /// A point or span of machine time in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Hash)]

@@ -33,6 +33,7 @@ impl<'a> Compiler<'a> {
         let mut order: Vec<usize> = (0..self.globals.len()).collect();
         let list = |i: &usize| self.globals[*i].list.map(|l| (self.lists[l].slot, key(&self.lists[l].name)));
         order.sort_by_cached_key(list);
+        order.retain(|i| !self.is_of_library(self.globals[*i].decl.name.span));
         for i in order {
             self.lay_out_global(i);
         }
@@ -55,6 +56,18 @@ impl<'a> Compiler<'a> {
         self.push_global(i, var.ty, offset);
         self.fill_variable(&var, offset, None);
         self.note_instances(var.ty, offset);
+        let path = self.global_path(i);
+        self.write_instance_paths(var.ty, offset, &path);
+    }
+
+    /// The globals of a library that are no constants have their places at their first use.
+    pub(crate) fn lay_out_library_global(&mut self, i: usize) {
+        let Some(var) = &self.globals[i].var else { return };
+        if self.is_of_library(var.span) && var.value.is_none() && matches!(var.storage, Storage::Nowhere) {
+            let home = self.home;
+            self.lay_out_global(i);
+            self.home = home;
+        }
     }
 
     /// The name of a global with that of its list.
@@ -110,6 +123,8 @@ impl<'a> Compiler<'a> {
             self.pous[i].vars[v].storage = Storage::Image(offset);
             self.fill_variable(&var, offset, Some(i));
             self.note_instances(var.ty, offset);
+            let path = format!("{}.{}", self.pous[i].tree.name.text, var.name);
+            self.write_instance_paths(var.ty, offset, &path);
         }
         if self.pous[i].tree.kind == PouKind::Program {
             self.lay_out_program(i);
@@ -131,6 +146,7 @@ impl<'a> Compiler<'a> {
         let doc = tree.doc.unwrap_or_default().into();
         self.program.globals.push(Global { name: tree.name.text.clone(), bare: true, ty, offset, constant: false, doc });
         self.note_instances(ty, offset);
+        self.write_instance_paths(ty, offset, &tree.name.text);
     }
 
     /// Notes the instances with resources and those of classes inside of a variable.

@@ -24,6 +24,7 @@ mod expression;
 mod heap;
 mod image;
 mod initial;
+mod instance_path;
 mod intrinsic;
 mod layout;
 mod library;
@@ -67,6 +68,8 @@ pub struct Input<'a> {
 /// Choices of a project.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
+    /// Name of the project, with which the paths of instances begin; if it is empty, `Application`.
+    pub name: String,
     /// Cut integers at each operator instead of when stored, passed or converted.
     pub iec_arithmetic: bool,
     /// Implicit conversions that may lose information are errors.

@@ -167,6 +167,7 @@ impl<'a> Lowering<'_, 'a> {
 
     pub(crate) fn global(&mut self, i: usize, span: Span) -> Operand {
         self.c.resolve_global(i);
+        self.c.lay_out_library_global(i);
         let Some(var) = &self.c.globals[i].var else { return self.error(span) };
         let (ty, value, storage, constant) = (var.ty, var.value.clone(), var.storage.clone(), var.constant);
         // What was wrong with a constant has been said where it is declared.

@@ -28,9 +28,19 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    /// What a name means outside of any unit: the user's first, then the libraries'.
+    /// Whether a place is in a source of a library.
+    pub(crate) fn is_of_library(&self, span: takt_syntax::Span) -> bool {
+        span.file.0 as usize >= self.user_files + self.options.conditions.len()
+    }
+
+    /// What a name means outside of any unit: the user's first, then the libraries'; in a library its own.
     pub(crate) fn global_name(&self, name: &str) -> Option<Item> {
         let key = key(name);
+        if self.in_library
+            && let Some(own) = self.library_names.get(&key)
+        {
+            return Some(*own);
+        }
         if !self.namespaces.is_empty()
             && let Some(found) = self.near_name(&key)
         {

@@ -212,10 +212,12 @@ impl<'a> Compiler<'a> {
         }
         self.declared[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.declared[index].home);
+        let own = self.is_of_library(tree.name.span);
+        let library = std::mem::replace(&mut self.in_library, own);
         self.inside.push((&tree.name, at));
         let ty = self.define(index, tree);
         self.inside.pop();
-        self.home = home;
+        (self.home, self.in_library) = (home, library);
         self.back(DECLARATION);
         self.declared[index].ty = Some(ty);
         self.declared[index].state = Progress::Done;
@@ -363,6 +365,7 @@ impl<'a> Compiler<'a> {
         }
         self.pous[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.pous[index].home);
+        let library = std::mem::replace(&mut self.in_library, self.pous[index].library);
         let tree = self.pous[index].tree;
         for other in [self.pous[index].base, self.owner_of(index)].into_iter().flatten() {
             if self.pous[other].state == Progress::Untouched || self.pous[index].base == Some(other) {
@@ -382,7 +385,7 @@ impl<'a> Compiler<'a> {
             self.lay_out_instance(index);
         }
         self.inside.pop();
-        self.home = home;
+        (self.home, self.in_library) = (home, library);
         self.back(DECLARATION);
         self.pous[index].state = Progress::Done;
     }
@@ -446,13 +449,15 @@ impl<'a> Compiler<'a> {
         }
         self.globals[index].state = Progress::Running;
         let home = std::mem::replace(&mut self.home, self.globals[index].home);
+        let own = self.is_of_library(decl.name.span);
+        let library = std::mem::replace(&mut self.in_library, own);
         self.inside.push((&decl.name, decl.name.span));
         let ty = self.variable_type(decl, None);
         let constant = self.globals[index].constant;
         self.note_address(decl, ty, constant, crate::address::Section::Global(index));
         let value = if constant && decl.init.is_some() { self.constant_of(decl, ty, None) } else { None };
         self.inside.pop();
-        self.home = home;
+        (self.home, self.in_library) = (home, library);
         self.back(DECLARATION);
         self.globals[index].var = Some(Variable {
             name: decl.name.text.clone(),

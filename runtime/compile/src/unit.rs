@@ -57,6 +57,8 @@ pub(crate) struct Compiler<'a> {
     pub(crate) home: Option<&'a tree::Home>,
     /// What is being resolved, and where each is named by the one before.
     pub(crate) inside: Vec<(&'a tree::Name, Span)>,
+    /// What is looked at belongs to a library, whose own names come before the program's.
+    pub(crate) in_library: bool,
     /// Names that were reported as unknown, per unit: numbers of their messages.
     pub(crate) unknown: HashMap<(Option<usize>, String), usize>,
     /// The program uses `__NEW`.
@@ -120,6 +122,7 @@ impl<'a> Compiler<'a> {
             namespaces: Vec::new(),
             home: None,
             inside: Vec::new(),
+            in_library: false,
             unknown: HashMap::new(),
             heap: false,
             native_blocks: HashMap::new(),
@@ -143,6 +146,7 @@ impl<'a> Compiler<'a> {
 
     /// Does all the work; the program is good only if no error was reported.
     pub(crate) fn run(&mut self) -> (Program, Vec<BodyId>) {
+        self.program.name = self.project_name();
         self.program.files = self.files.iter().map(|f| f.name.clone()).collect();
         self.register_libraries();
         self.collect();
@@ -244,15 +248,15 @@ impl<'a> Compiler<'a> {
     /// Lowers queued bodies until there is none left.
     pub(crate) fn drain(&mut self) {
         while let Some((id, job)) = self.queue.pop() {
-            self.home = match job {
-                Job::Pou(pou) | Job::Start(pou) => self.pous[pou].home,
-            };
+            let (Job::Pou(unit) | Job::Start(unit)) = job;
+            (self.home, self.in_library) = (self.pous[unit].home, self.pous[unit].library);
             let body = match job {
                 Job::Pou(pou) => self.lower_body(id, pou),
                 Job::Start(pou) => self.lower_start(id, pou),
             };
             self.program.bodies[id.0 as usize] = body;
         }
+        self.in_library = false;
     }
 
     fn lower_conditions(&mut self) -> Vec<BodyId> {

@@ -16,6 +16,7 @@ use crate::observe::Observer;
 use crate::options::{Clock, Preemption};
 use crate::retain::{Keeper, Reset, Restore};
 use crate::schedule::TaskState;
+use crate::system::SystemInfo;
 use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -42,6 +43,8 @@ pub(crate) struct Core {
     pub bus: usize,
     pub stage: Stage,
     pub links: Vec<Link>,
+    /// What the program is told of its tasks.
+    pub system: SystemInfo,
     /// Variables with addresses from VAR_CONFIG.
     pub mappings: Vec<Mapping>,
     pub io: ProcessImage,
@@ -194,8 +197,11 @@ impl Core {
         if matches!(self.clock, Clock::Real(_)) {
             task.statistics.jitter_ns.add(started.0.saturating_sub(task.release.0).max(0) as u64);
         }
+        let overruns = task.statistics.overruns;
         task.start(now);
         (task.running, task.step) = (true, self.steps);
+        let late = task.statistics.overruns > overruns;
+        self.system.scan(index, now, task.statistics.cycles, late, self.image.bytes_mut());
         (env.now, env.period, env.task, env.cycle) = (now, task.period, index as u32, task.statistics.cycles);
         outer
     }
@@ -436,6 +442,7 @@ impl Core {
         let image = self.image.bytes_mut();
         image.fill(0);
         image[..program.init.len()].copy_from_slice(&program.init);
+        self.system.start(&program, image);
         if let Some(restore) = restore {
             restore.apply(image);
         }

@@ -13,7 +13,7 @@ use crate::retain::{Reset, Restore, RetainLayout, SnapshotReader};
 use crate::statistics::TaskStatistics;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use takt_abi::{Fault, Time};
+use takt_abi::{Fault, Message, Time};
 use takt_ir::{Base, BodyId, Inst, Place, Program};
 
 /// Fuel of a condition.
@@ -137,6 +137,16 @@ impl Engine {
             cycle: core.tasks[core.bus].statistics.cycles,
         };
         core.stop_application(raw);
+    }
+
+    /// What the program said to people: the oldest message, once. Messages that nobody takes in time are lost, see [`Engine::lost_messages`].
+    pub fn take_message(&mut self) -> Option<Message> {
+        self.core.env.get_mut().messages.take()
+    }
+
+    /// How many messages were lost since this was asked the last time.
+    pub fn lost_messages(&mut self) -> u64 {
+        self.core.env.get_mut().messages.lost()
     }
 
     /// For another thread or a signal handler.

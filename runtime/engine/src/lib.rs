@@ -30,6 +30,7 @@ mod pack;
 mod retain;
 mod schedule;
 mod statistics;
+mod system;
 
 pub use axis::stage::AxisStatus;
 pub use axis::{AxisConfig, AxisLimits, AxisProblem, Encoder, FeedForward, Home, Lag, cia402::DriveState};

@@ -13,6 +13,7 @@ use crate::memory::{Image, Lane, Pinned};
 use crate::options::{Clock, ExecutorKind, Options};
 use crate::retain::Keeper;
 use crate::schedule::{TaskState, default_bus_task};
+use crate::system::SystemInfo;
 use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -167,6 +168,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     limit(&program, &mut tasks, options.limits, &options.task_limits)?;
     let spare = Pinned::new(lane());
     let period = tasks[bus].period;
+    let system = SystemInfo::new(&program, &tasks);
     env.get_mut().bus_period = period;
     if let Some(part) = options.restore.as_ref().and_then(|restore| restore.defect(&program)) {
         return Err(LoadError::Restore { part });
@@ -184,6 +186,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         bus,
         stage: Stage::new(options.axes, period.seconds()),
         links,
+        system,
         mappings: program.mapped.iter().map(|mapped| Mapping::new(&program, *mapped)).collect(),
         io: ProcessImage::new(driver.size()),
         driver,

@@ -148,6 +148,8 @@ impl Family {
 /// A program, ready to be verified and run.
 #[derive(Debug, Clone, Default)]
 pub struct Program {
+    /// Name of the project.
+    pub name: String,
     /// Bodies.
     pub bodies: Vec<Body>,
     /// Native functions that bodies call.

@@ -6,6 +6,7 @@ mod import;
 mod live;
 mod outputs;
 mod run;
+mod said;
 mod summary;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};

@@ -58,6 +58,8 @@ words! {
     TimedOut "The demonstration did not end in its time" "演示未在规定时间内结束",
     WaitingFor "it waited for" "正在等待",
     ReadAs "was read as" "读取编码为",
+    Message "message" "消息",
+    MessagesLost "messages of the program were lost: too many in one scan" "条程序消息丢失:一个周期内过多",
     FilesWritten "files written to" "个文件已写入",
     LeftBehind "Not carried over" "未能导入",
     AlreadyThere "already exists; an import never overwrites" "已存在;导入不会覆盖",

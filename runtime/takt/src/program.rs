@@ -54,6 +54,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
     let manifest_name = project.manifest_file.as_ref().map_or("--until", |(name, _)| name.as_str());
     let name = |condition: &Condition| if condition.span.is_some() { manifest_name } else { "--until" }.to_string();
     let options = takt_compile::Options {
+        name: project.name.clone(),
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
         lint: true,

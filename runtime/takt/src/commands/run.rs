@@ -1,6 +1,7 @@
 //! `takt run`: runs a program until it is over.
 
 use super::outputs::{Outputs, Writer, warning};
+use super::said::Teller;
 use super::{EngineKind, Exit, Format, RunArgs, Speed, check, summary};
 use crate::clock::{self, Pace};
 use crate::console;
@@ -47,6 +48,7 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     let stats = args.stats.as_deref().map(|path| summary::statistics_file(path).map_err(|error| usage(&error))).transpose()?;
     let outputs = Outputs::open(args, &machine)?;
     let mut writer = Writer::start(outputs, &mut machine, real)?;
+    let mut teller = Teller::start(real)?;
     platform::listen_for_stop();
     let settings = project.manifest.realtime;
     let held = real.then(|| Held::hold(settings, machine.engine().native_stack()));
@@ -58,11 +60,15 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         Speed::Factor(factor) => Some(factor),
     });
     let pace = if real { pace.spinning(settings.spin) } else { pace };
-    let over = turn(args, &mut machine, &pace, |machine| writer.scanned(machine));
+    let over = turn(args, &mut machine, &pace, |machine| {
+        teller.scanned(machine);
+        writer.scanned(machine);
+    });
     let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
     let disturbances = held.as_ref().map(|_| system::disturbances().since(before));
     drop(held);
     let lost = writer.finish(&mut machine, args)?;
+    teller.finish(&mut machine);
     let thread = disturbances.map(|disturbances| summary::Thread { disturbances, lost });
     if let Some(format) = stats {
         format.write(&mut machine, thread.as_ref()).map_err(|error| usage(&error))?;
