@@ -304,7 +304,7 @@ fn the_blocks_of_twincat_work_on_the_same_files() {
     let paths = [
         "main.state",
         "main.err",
-        "main.at",
+        "main.told",
         "main.back",
         "main.one",
         "main.two",
