@@ -121,6 +121,16 @@ fn ten_thousand_cases_are_no_problem() {
 }
 
 #[test]
+fn a_gigabyte_of_zeros_costs_the_compiler_nothing() {
+    let text =
+        "VAR_GLOBAL a : ARRAY [0..1000000000] OF BYTE; b : INT := 7; c : ARRAY [0..1000000000] OF BYTE := [1000000001(0)]; END_VAR\n";
+    let output = compile(format!("{text}{MAIN}"));
+    let program = output.program.expect("no error, so a program");
+    assert!(program.init.len() < 1 << 20, "{} bytes", program.init.len());
+    assert!(program.init_body.is_some(), "what lies behind is set by the start body");
+}
+
+#[test]
 fn an_array_of_a_million_blocks_is_no_problem() {
     let blocks =
         "FUNCTION_BLOCK A\nVAR x : INT := 7; t : TON; END_VAR\nEND_FUNCTION_BLOCK\nFUNCTION_BLOCK B EXTENDS A\nEND_FUNCTION_BLOCK\n";

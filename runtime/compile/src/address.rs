@@ -13,7 +13,7 @@ use crate::expression::{Kind, Lowering, Operand, Thing};
 use crate::place::Place;
 use crate::scope::{PouKind, Storage, Variable};
 use crate::unit::Compiler;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap as HashMap;
 use takt_abi::Elem;
 use takt_ir::{Address, Area, Base, Global, Type, TypeId};
 use takt_syntax::tree::{Direct, Expr, VarDecl, VarKind};

@@ -5,10 +5,13 @@ use crate::initial::Target;
 use crate::place::{Place, mem};
 use crate::scope::{PouKind, Storage, Variable, key};
 use crate::unit::Compiler;
-use std::collections::HashSet;
+use rustc_hash::FxHashSet as HashSet;
 use takt_ir::{Base, Body, BodyId, Inst, Local, Ty, Type, TypeId};
 use takt_syntax::tree::{ArgKind, Expr, ExprKind, Stmt, StmtKind, VarKind};
 use takt_syntax::{Code, FileId, Source, Span};
+
+/// Bytes that a variable has at the most that each call makes anew.
+const LARGEST_IN_FRAME: u32 = 64 << 20;
 
 /// How a variable of a function is passed, in the order of the IR's parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -260,18 +263,42 @@ impl<'a> Lowering<'_, 'a> {
             }
             return;
         }
-        let mut bytes = vec![0; self.c.types.size(v.ty) as usize];
-        let mut late = Vec::new();
+        let (mut bytes, mut late) = (Vec::new(), Vec::new());
         self.c.fill(v.decl, v.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
+        let size = self.frame_bytes(v.ty, v.span);
         let operand = self.stored(storage, v.ty, v.span);
         let Kind::Place(Place::Memory { base, offset }) = operand.kind else { return };
-        let data = self.pool(&bytes);
-        self.b.push(Inst::Data { dst: base, offset, data, len: bytes.len() as u32 });
+        self.put_bytes(base, offset, &bytes, size);
         if base == Base::Frame {
             self.put_instances(v.ty, offset, 1);
         }
         for late in late {
             self.set_late(base, offset, late);
+        }
+    }
+
+    /// Bytes of a variable that each call makes anew.
+    fn frame_bytes(&mut self, ty: TypeId, span: Span) -> u32 {
+        let size = self.c.types.size(ty);
+        if size <= LARGEST_IN_FRAME {
+            return size;
+        }
+        let help = "declare it in VAR_STAT, in a block or globally";
+        self.report(Code::TooLarge, span, "a variable that each call makes anew takes more than 64 MiB").help = Some(help.into());
+        0
+    }
+
+    /// Sets a variable to its first bytes, and the rest of its `size` to 0.
+    fn put_bytes(&mut self, base: Base, offset: u32, bytes: &[u8], size: u32) {
+        let bytes = &bytes[..bytes.len().min(size as usize)];
+        let len = bytes.len() as u32;
+        if len > 0 {
+            let data = self.pool(bytes);
+            self.b.push(Inst::Data { dst: base, offset, data, len });
+        }
+        if len < size {
+            let data = self.zeros(size - len);
+            self.b.push(Inst::Data { dst: base, offset: offset.saturating_add(len), data, len: size - len });
         }
     }
 
@@ -294,10 +321,8 @@ impl<'a> Lowering<'_, 'a> {
                 self.store(&place, ty, value, true, span);
             }
             (None, Place::Memory { base, offset }) => {
-                let size = self.c.types.size(ty);
-                let bytes = bytes.map_or_else(|| vec![0; size as usize], |b| b.to_vec());
-                let data = self.pool(&bytes);
-                self.b.push(Inst::Data { dst: *base, offset: *offset, data, len: size });
+                let size = self.frame_bytes(ty, span);
+                self.put_bytes(*base, *offset, bytes.as_ref().map_or(&[], |b| b), size);
             }
             _ => {}
         }
@@ -305,7 +330,7 @@ impl<'a> Lowering<'_, 'a> {
 
     /// Names of variables whose address is asked for: by ADR, REF=, or as a VAR_IN_OUT.
     fn taken(&self, statements: &'a [Stmt]) -> HashSet<String> {
-        let mut taken = HashSet::new();
+        let mut taken = HashSet::default();
         for v in self.levels.iter().take(2).flat_map(|l| &self.c.pous[l.pou].vars) {
             if let Some(takt_syntax::tree::Init::Expr(e)) = v.init {
                 if let Type::Reference(_) = self.c.types.get(v.ty) {

@@ -3,7 +3,7 @@
 use crate::limits::EXTENDS;
 use crate::scope::{Item, Member, Owner, PouKind, key};
 use crate::unit::Compiler;
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use takt_ir::{BodyId, Class, Dispatch, Family, Ty};
 use takt_syntax::tree::{Name, VarKind};
 use takt_syntax::{Code, Note, Span};
@@ -176,7 +176,7 @@ impl<'a> Compiler<'a> {
 
     /// An interface and what it extends, each once, in the order in which members are looked for.
     fn extended(&self, interface: usize) -> Vec<usize> {
-        let (mut all, mut seen, mut open) = (Vec::new(), HashSet::new(), vec![interface]);
+        let (mut all, mut seen, mut open) = (Vec::new(), HashSet::default(), vec![interface]);
         while let Some(next) = open.pop().filter(|_| all.len() <= EXTENDS) {
             if seen.insert(next) {
                 all.push(next);

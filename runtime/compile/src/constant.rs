@@ -23,6 +23,15 @@ impl Value {
             _ => 0,
         }
     }
+    /// Whether its bytes are all 0.
+    pub(crate) fn is_zero(&self) -> bool {
+        match self {
+            Self::Int(v) => *v == 0,
+            Self::Real(v) => v.to_bits() == 0,
+            Self::Text(text) => text.is_empty(),
+            Self::Wide(text) => text.is_empty(),
+        }
+    }
 }
 
 /// Lowest and highest value of an integer-like type.

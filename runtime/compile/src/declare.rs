@@ -2,7 +2,7 @@
 
 use crate::scope::{Declared, GlobalVar, Head, Interface, Item, List, Member, Owner, Pou, PouKind, Progress, key};
 use crate::unit::Compiler;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap as HashMap;
 use takt_syntax::tree::{self, TypeKind, Unit, VarKind};
 use takt_syntax::{Code, Span};
 
@@ -48,7 +48,7 @@ impl<'a> Compiler<'a> {
             Unit::Interface(tree) => {
                 let ty = self.types.intern(takt_ir::Type::Interface(tree.name.text.as_str().into()));
                 let index = self.interfaces.len();
-                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), all: vec![index], members: HashMap::new() });
+                self.interfaces.push(Interface { tree, ty, extends: Vec::new(), all: vec![index], members: HashMap::default() });
                 self.interface_of_type.insert(ty, index);
                 self.interfaces[index].members = self.collect_members(library, Owner::Interface(index), &tree.methods, &tree.properties);
                 self.add(library, &tree.name, Item::Interface(index));
@@ -101,7 +101,7 @@ impl<'a> Compiler<'a> {
             ty: None,
             result: None,
             vars: Vec::new(),
-            index: HashMap::new(),
+            index: HashMap::default(),
             begun: Default::default(),
             home: self.home,
             instance: 0,
@@ -109,13 +109,13 @@ impl<'a> Compiler<'a> {
             start: None,
             library,
             owner,
-            members: HashMap::new(),
+            members: HashMap::default(),
             base: None,
             children: Vec::new(),
             implements: Vec::new(),
             class: 0,
-            kept: HashMap::new(),
-            enumerators: HashMap::new(),
+            kept: HashMap::default(),
+            enumerators: HashMap::default(),
         });
         self.pous.len() - 1
     }
@@ -128,7 +128,7 @@ impl<'a> Compiler<'a> {
         methods: &'a [tree::Method],
         properties: &'a [tree::Property],
     ) -> HashMap<String, Member> {
-        let mut members = HashMap::new();
+        let mut members = HashMap::default();
         for method in methods {
             let head = Head {
                 kind: PouKind::Method,
@@ -177,7 +177,7 @@ impl<'a> Compiler<'a> {
         let list = match self.list_names.get(&key(&name)) {
             Some(list) => *list,
             None => {
-                self.lists.push(List { name: name.clone(), qualified_only, vars: std::collections::HashMap::new(), slot });
+                self.lists.push(List { name: name.clone(), qualified_only, vars: rustc_hash::FxHashMap::default(), slot });
                 let list = self.lists.len() - 1;
                 self.list_names.insert(key(&name), list);
                 self.add_bare(library, &name, Item::List(list));

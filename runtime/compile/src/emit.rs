@@ -108,7 +108,8 @@ impl Builder {
     }
     /// A place in the frame.
     pub(crate) fn slot(&mut self, size: u32, align: u32) -> u32 {
-        let at = self.frame.next_multiple_of(align.max(1));
+        let align = align.max(1);
+        let at = self.frame.checked_next_multiple_of(align).unwrap_or(u32::MAX - u32::MAX % align);
         self.frame = at.saturating_add(size);
         self.frame_high = self.frame_high.max(self.frame);
         at
@@ -148,7 +149,7 @@ impl Builder {
             params: self.params,
             locals: self.locals,
             result: self.result,
-            frame_size: self.frame_high.next_multiple_of(16),
+            frame_size: self.frame_high.min(u32::MAX - 15).next_multiple_of(16),
             recursive: false,
             entry_site: self.entry_site,
         }

@@ -107,7 +107,7 @@ pub(crate) struct Lowering<'c, 'a> {
     pub(crate) loops: Vec<Loop>,
     /// __TRY statements under way: loops around them, and what __FINALLY says.
     pub(crate) protected: Vec<(usize, &'a [takt_syntax::tree::Stmt])>,
-    pub(crate) labels: std::collections::HashMap<String, (BlockId, bool, Span)>,
+    pub(crate) labels: rustc_hash::FxHashMap<String, (BlockId, bool, Span)>,
     pub(crate) scratch: bool,
     /// What is being lowered is about to be written.
     pub(crate) writes: bool,

@@ -99,6 +99,9 @@ impl<'a> Lowering<'_, 'a> {
         let (there, end) = (self.b.block(), self.b.block());
         self.b.end(Term::Branch { cond: pointer, then: there, other: end });
         self.b.go_to(there);
+        if !self.c.initial_fits(ty, span) {
+            return pointer;
+        }
         let plain = self.c.type_bytes(ty).is_none() && !self.c.constructs(ty) && !self.c.has_classes(ty);
         if plain {
             self.b.continue_in(end);

@@ -1,6 +1,6 @@
 //! The image: where globals, programs, statics and stacks lie, and its first bytes.
 
-use crate::initial::{Late, Target};
+use crate::initial::{LARGEST_INITIAL, Late, Target};
 use crate::scope::{PouKind, Storage, key};
 use crate::unit::Compiler;
 use takt_abi::Section;
@@ -89,11 +89,10 @@ impl<'a> Compiler<'a> {
     }
 
     pub(crate) fn fill_variable(&mut self, var: &crate::scope::Variable<'a>, offset: u32, pou: Option<usize>) {
-        let size = self.types.size(var.ty) as usize;
-        let mut bytes = vec![0; size];
-        let mut late = Vec::new();
+        let (mut bytes, mut late) = (Vec::new(), Vec::new());
         self.fill(var.decl, var.ty, 0, &mut Target { pou, bytes: &mut bytes, late: &mut late });
         if let (Type::Bit(_), Some(byte)) = (self.types.get(var.ty), self.program.init.get(offset as usize)) {
+            bytes.resize(1, 0);
             bytes[0] |= byte;
         }
         self.write(offset, &bytes);
@@ -101,10 +100,13 @@ impl<'a> Compiler<'a> {
         self.late.extend(late.into_iter().map(|late| (pou, home, Late { offset: offset + late.offset, ..late })));
     }
 
-    /// Writes initial bytes; zeros at the end of the image cost nothing.
+    /// Writes initial bytes; zeros at the end of the image cost nothing. What is far behind is set by the start body.
     fn write(&mut self, offset: u32, bytes: &[u8]) {
         let Some(used) = bytes.iter().rposition(|b| *b != 0) else { return };
         let end = offset as usize + used + 1;
+        if end as u64 > LARGEST_INITIAL {
+            return self.far.push((offset, bytes[..=used].to_vec()));
+        }
         if self.program.init.len() < end {
             self.program.init.resize(end, 0);
         }

@@ -5,9 +5,9 @@ use crate::expression::{Kind, Lowering, Operand};
 use crate::scope::{Progress, key, same};
 use crate::unit::Compiler;
 use std::rc::Rc;
-use takt_ir::{Base, StructKind, Type, TypeId};
+use takt_ir::{Base, Inst, StructKind, Type, TypeId};
 use takt_syntax::tree::{self, Init, InitItem};
-use takt_syntax::{Code, Span};
+use takt_syntax::{Code, FileId, Span};
 
 /// What is set by code at the start.
 #[derive(Debug, Clone, Copy)]
@@ -26,12 +26,30 @@ pub(crate) enum What<'a> {
     Construct(&'a tree::VarDecl),
 }
 
+/// Bytes of initial values that a variable or a type has at the most. Zeros at the end are not counted.
+pub(crate) const LARGEST_INITIAL: u64 = 256 << 20;
+
 /// Initial bytes being written, and what cannot be bytes.
 pub(crate) struct Target<'a, 'b> {
     /// The unit whose names the expressions may use.
     pub(crate) pou: Option<usize>,
-    pub(crate) bytes: &'b mut [u8],
+    /// As many as have been written; 0 behind them.
+    pub(crate) bytes: &'b mut Vec<u8>,
     pub(crate) late: &'b mut Vec<Late<'a>>,
+}
+
+impl Target<'_, '_> {
+    /// Room for a value. `None`: it is behind [`LARGEST_INITIAL`].
+    fn room(&mut self, at: u32, size: usize) -> Option<&mut [u8]> {
+        let (start, end) = (at as usize, at as usize + size);
+        if end as u64 > LARGEST_INITIAL {
+            return None;
+        }
+        if self.bytes.len() < end {
+            self.bytes.resize(end, 0);
+        }
+        self.bytes.get_mut(start..end)
+    }
 }
 
 /// What is left of an array: the next element's offset, the end, bytes per element.
@@ -115,7 +133,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    /// Initial bytes of a type.
+    /// Initial bytes of a type, without zeros at their end. `None`: all are 0, or [`Compiler::initial_fits`] does not hold.
     pub(crate) fn type_bytes(&mut self, ty: TypeId) -> Option<Rc<Vec<u8>>> {
         if let Some(bytes) = self.type_init.get(&ty) {
             return Some(bytes.clone());
@@ -123,8 +141,16 @@ impl<'a> Compiler<'a> {
         match self.types.get(ty).clone() {
             Type::Array { elem, .. } => {
                 let one = self.type_bytes(elem)?;
-                let count = self.types.size(ty) as usize / one.len().max(1);
-                let bytes = Rc::new(one.repeat(count));
+                let (all, each) = (self.types.size(ty), self.types.size(elem).max(1));
+                let mut bytes = Vec::new();
+                if u64::from(all) <= LARGEST_INITIAL && !one.is_empty() {
+                    bytes.reserve_exact(all as usize);
+                    for _ in 0..all / each {
+                        bytes.extend_from_slice(&one);
+                        bytes.resize(bytes.len().next_multiple_of(each as usize), 0);
+                    }
+                }
+                let bytes = Rc::new(bytes);
                 self.type_init.insert(ty, bytes.clone());
                 Some(bytes)
             }
@@ -137,10 +163,31 @@ impl<'a> Compiler<'a> {
         }
     }
 
+    /// Whether there is memory for the initial values of a type, while the program is compiled; reports it.
+    pub(crate) fn initial_fits(&mut self, ty: TypeId, span: Span) -> bool {
+        // An array whose elements are not 0 and that is too large has a template without bytes.
+        let empty = self.type_bytes(ty).is_some_and(|bytes| bytes.is_empty());
+        if empty {
+            self.too_much(span);
+        }
+        !empty
+    }
+
+    fn too_much(&mut self, span: Span) {
+        self.report(Code::TooLarge, span, "its initial values take more than 256 MiB").help =
+            Some("let a loop of the program set them, or declare it behind the variables that are smaller".into());
+    }
+
     /// Writes a variable's initial value at `at`: its type's, then its own. What is not constant goes to `late`.
     pub(crate) fn fill(&mut self, decl: &'a tree::VarDecl, ty: TypeId, at: u32, target: &mut Target<'a, '_>) {
+        if !self.initial_fits(ty, decl.name.span) {
+            return;
+        }
         if let Some(template) = self.type_bytes(ty) {
-            target.bytes[at as usize..at as usize + template.len()].copy_from_slice(&template);
+            match target.room(at, template.len()) {
+                Some(bytes) => bytes.copy_from_slice(&template),
+                None => return self.too_much(decl.name.span),
+            }
         }
         let alias = match &decl.ty.kind {
             tree::TypeExprKind::Named(parts) => parts.last().and_then(|n| self.alias_init(&n.text)),
@@ -188,11 +235,17 @@ impl<'a> Compiler<'a> {
         };
         let wanted = if bit.is_some() { self.elem(takt_abi::Elem::Bool) } else { ty };
         match self.known(expr, target.pou, Some(wanted)).0 {
-            Known::Value(value) if let Some(bit) = bit => {
-                let byte = &mut target.bytes[at as usize];
-                *byte = *byte & !(1 << bit) | u8::from(value.word() != 0) << bit;
+            Known::Value(value) if value.is_zero() && at as usize >= target.bytes.len() => {}
+            Known::Value(value) => {
+                let Some(bytes) = target.room(at, self.types.size(ty) as usize) else {
+                    self.too_much(expr.span);
+                    return false;
+                };
+                match bit {
+                    Some(bit) => bytes[0] = bytes[0] & !(1 << bit) | u8::from(value.word() != 0) << bit,
+                    None => self.store_value(&value, ty, bytes),
+                }
             }
-            Known::Value(value) => self.store_value(&value, ty, &mut target.bytes[at as usize..]),
             Known::Dynamic => target.late.push(Late { offset: at, ty, what: What::Expr(expr) }),
             Known::Error => return false,
         }
@@ -247,13 +300,18 @@ impl<'a> Compiler<'a> {
             room.next += room.size;
         }
         let stride = if values.is_empty() { room.size } else { room.next - start };
-        for i in u32::from(!values.is_empty())..count {
-            if !values.is_empty() {
-                let (from, to) = (start as usize, (start + i * stride) as usize);
-                target.bytes.copy_within(from..from + stride as usize, to);
+        let copies = count.saturating_sub(u32::from(!values.is_empty()));
+        // Zeros behind what has been written are there already.
+        if !values.is_empty() && (start as usize) < target.bytes.len() {
+            let Some(bytes) = target.room(start, (copies as usize + 1) * stride as usize) else {
+                self.too_much(span);
+                return None;
+            };
+            for i in 1..=copies as usize {
+                bytes.copy_within(..stride as usize, i * stride as usize);
             }
-            room.next += stride;
         }
+        room.next += copies * stride;
         Some(())
     }
 
@@ -335,10 +393,15 @@ impl<'a> Compiler<'a> {
     /// The body that sets what is not bytes.
     pub(crate) fn initialise(&mut self) {
         let late = std::mem::take(&mut self.late);
-        let Some((.., first)) = late.first() else { return };
-        let span = first.span();
+        let first = late.first().map(|(.., late)| late.span());
+        let Some(span) = first.or(self.far.first().map(|_| Span { file: FileId(0), start: 0, end: 0 })) else { return };
         let id = self.reserve("(initial values)", span);
+        let far = std::mem::take(&mut self.far);
         let mut lowering = Lowering::new(self, id, "(initial values)", None, span);
+        for (offset, bytes) in far {
+            let (data, len) = (lowering.pool(&bytes), bytes.len() as u32);
+            lowering.b.push(Inst::Data { dst: Base::Image, offset, data, len });
+        }
         for (pou, home, late) in late {
             lowering.enter(pou);
             lowering.c.home = home;

@@ -4,7 +4,7 @@ use crate::initial::Target;
 use crate::scope::{PouKind, Storage, key};
 use crate::types::LARGEST;
 use crate::unit::Compiler;
-use std::collections::HashSet;
+use rustc_hash::FxHashSet as HashSet;
 use std::rc::Rc;
 use std::sync::Arc;
 use takt_abi::Section;
@@ -91,17 +91,19 @@ impl<'a> Compiler<'a> {
                 doc: decl.doc.clone().unwrap_or_default(),
             });
         }
-        let (size, align) = layout.end();
-        self.too_large(size, decls.first().map(|d| d.name.span));
+        let (mut size, align) = layout.end();
+        let too_large = self.too_large(size, decls.first().map(|d| d.name.span));
+        if too_large {
+            size = folded(&mut fields);
+        }
         let offsets: Vec<_> = fields.iter().map(|f| (f.offset, f.ty)).collect();
         self.types.set(id, Type::Struct(Arc::new(Structure { name: name.into(), kind, fields, size, align })));
-        let mut bytes = vec![0; size as usize];
-        let mut late = Vec::new();
+        let (mut bytes, mut late) = (Vec::new(), Vec::new());
         if let Some(base) = base {
             late.extend(self.type_late.get(&base).iter().flat_map(|late| late.iter()).copied());
             self.inherit_bytes(base, &mut bytes);
         }
-        let own = &offsets[offsets.len() - decls.len()..];
+        let own = if too_large { &[] } else { &offsets[offsets.len() - decls.len()..] };
         for (decl, (offset, ty)) in decls.iter().zip(own) {
             self.fill(decl, *ty, *offset, &mut Target { pou: None, bytes: &mut bytes, late: &mut late });
         }
@@ -117,14 +119,14 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn inherit_bytes(&self, base: TypeId, bytes: &mut [u8]) {
-        if let Some(template) = self.type_init.get(&base) {
-            bytes[..template.len()].copy_from_slice(template);
-        }
+    fn inherit_bytes(&self, base: TypeId, bytes: &mut Vec<u8>) {
+        bytes.extend(self.type_init.get(&base).iter().flat_map(|template| template.iter()));
     }
 
-    fn keep_initial(&mut self, id: TypeId, bytes: Vec<u8>, late: Vec<crate::initial::Late<'a>>) {
-        if bytes.iter().any(|b| *b != 0) {
+    fn keep_initial(&mut self, id: TypeId, mut bytes: Vec<u8>, late: Vec<crate::initial::Late<'a>>) {
+        if let Some(last) = bytes.iter().rposition(|b| *b != 0) {
+            bytes.truncate(last + 1);
+            bytes.shrink_to_fit();
             self.type_init.insert(id, Rc::new(bytes));
         }
         if !late.is_empty() {
@@ -132,10 +134,13 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    pub(crate) fn too_large(&mut self, size: u32, span: Option<Span>) {
-        if let (true, Some(span)) = (u64::from(size) > LARGEST, span) {
+    /// Whether a structure is too large; reports it.
+    fn too_large(&mut self, size: u32, span: Option<Span>) -> bool {
+        let too_large = u64::from(size) > LARGEST;
+        if let (true, Some(span)) = (too_large, span) {
             self.report(Code::TooLarge, span, "this structure does not fit the memory of an application (2 GiB)");
         }
+        too_large
     }
 
     pub(crate) fn lay_out_instance(&mut self, index: usize) {
@@ -180,12 +185,14 @@ impl<'a> Compiler<'a> {
             layout.align = layout.align.max(takt_abi::GRANULE as u32);
             layout.size = layout.size.max(1);
         }
-        let (size, align) = layout.end();
-        self.too_large(size, Some(tree.name.span));
+        let (mut size, align) = layout.end();
+        if self.too_large(size, Some(tree.name.span)) {
+            size = folded(&mut fields);
+            filled.clear();
+        }
         let kind = if tree.kind == PouKind::Program { StructKind::Program } else { StructKind::Block };
         self.types.set(id, Type::Struct(Arc::new(Structure { name: tree.name.text.clone(), kind, fields, size, align })));
-        let mut bytes = vec![0; size as usize];
-        let mut late = Vec::new();
+        let (mut bytes, mut late) = (Vec::new(), Vec::new());
         if let Some(base) = base {
             self.inherit_bytes(base, &mut bytes);
         }
@@ -218,6 +225,12 @@ impl<'a> Compiler<'a> {
         }
         kept
     }
+}
+
+/// A structure that is too large shrinks to a byte, so that what contains it is not too large as well; its size then.
+fn folded(fields: &mut [Field]) -> u32 {
+    fields.iter_mut().for_each(|field| field.offset = 0);
+    1
 }
 
 /// Offsets as `repr(C)` gives them.

@@ -108,7 +108,10 @@ impl Compiler<'_> {
             self.types.push(Type::Struct(Arc::new(Structure { name: name.into(), kind, fields, size: size as u32, align: align as u32 })));
         let mut bytes = vec![0; size];
         init(&mut bytes);
-        self.type_init.insert(ty, Rc::new(bytes));
+        if let Some(last) = bytes.iter().rposition(|b| *b != 0) {
+            bytes.truncate(last + 1);
+            self.type_init.insert(ty, Rc::new(bytes));
+        }
         ty
     }
 }

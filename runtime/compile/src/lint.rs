@@ -12,7 +12,7 @@ mod uses;
 
 use crate::scope::{Member, Owner};
 use crate::unit::Compiler;
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use takt_syntax::{Code, Diagnostic, Severity, Span};
 
 /// What all units say of names, by key.
@@ -51,12 +51,12 @@ impl<'a> Compiler<'a> {
     }
 
     fn known_names(&self) -> Known {
-        let mut members = HashSet::new();
-        let mut seen_by: HashMap<usize, Vec<usize>> = HashMap::new();
+        let mut members = HashSet::default();
+        let mut seen_by: HashMap<usize, Vec<usize>> = HashMap::default();
         let mut uses = Vec::with_capacity(self.pous.len());
         for (unit, pou) in self.pous.iter().enumerate() {
             if pou.library {
-                uses.push(HashMap::new());
+                uses.push(HashMap::default());
                 continue;
             }
             let mut found = names::Names::default();

@@ -1,7 +1,7 @@
 //! What names mean: the entries of the scopes.
 
 use crate::constant::Value;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap as HashMap;
 use takt_abi::FnDesc;
 use takt_ir::{BodyId, Local, TypeId};
 use takt_syntax::Span;
@@ -108,7 +108,7 @@ pub(crate) struct Pou<'a> {
     /// Where in `vars` a name is.
     pub(crate) index: HashMap<String, usize>,
     /// Where the names of the constants stand whose declarations were begun.
-    pub(crate) begun: std::collections::HashSet<u32>,
+    pub(crate) begun: rustc_hash::FxHashSet<u32>,
     /// Offset of the singleton of a PROGRAM.
     pub(crate) instance: u32,
     /// Its body, once asked for.

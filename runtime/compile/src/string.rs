@@ -57,6 +57,19 @@ impl Lowering<'_, '_> {
         (data.len() - bytes.len()) as u32
     }
 
+    /// So many bytes of 0, which others use too.
+    pub(crate) fn zeros(&mut self, len: u32) -> u32 {
+        let (at, known) = self.c.zeros;
+        if len <= known {
+            return at;
+        }
+        let data = &mut self.c.program.data;
+        let at = data.len() as u32;
+        data.resize(data.len() + len as usize, 0);
+        self.c.zeros = (at, len);
+        at
+    }
+
     /// A string in memory: base, offset, capacity. A literal goes to the frame.
     pub(crate) fn text_place(&mut self, a: &Operand) -> (Base, u32, u32) {
         match &a.kind {

@@ -5,7 +5,7 @@ use crate::layout::{is_bit, kept_key};
 use crate::limits::DECLARATION;
 use crate::scope::{Item, PouKind, Progress, Storage, Variable, key};
 use crate::unit::Compiler;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap as HashMap;
 use std::collections::hash_map::Entry;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -274,7 +274,7 @@ impl<'a> Compiler<'a> {
                 Elem::Int
             }),
         };
-        let mut values: HashMap<String, i64> = HashMap::new();
+        let mut values: HashMap<String, i64> = HashMap::default();
         let mut next = 0i128;
         let mut members: Vec<(String, i64)> = Vec::new();
         for (member, value) in &body.members {

@@ -4,7 +4,7 @@ use crate::emit::Builder;
 use crate::scope::{Declared, GlobalVar, Interface, Item, List, Owner, Pou, PouKind};
 use crate::sites::Sites;
 use crate::{Input, Options};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap as HashMap;
 use takt_ir::{BodyId, Native, NativeId, Program, TypeId, Types};
 use takt_syntax::{Code, Diagnostic, FileId, Source, Span, tree};
 
@@ -69,9 +69,9 @@ pub(crate) struct Compiler<'a> {
     /// Initial values of aliases and enumerations.
     pub(crate) pou_of_type: HashMap<TypeId, usize>,
     /// Enumerations with `{attribute 'strict'}`.
-    pub(crate) strict_enums: std::collections::HashSet<TypeId>,
+    pub(crate) strict_enums: rustc_hash::FxHashSet<TypeId>,
     /// Enumerations with `{attribute 'to_string'}`.
-    pub(crate) spelled_enums: std::collections::HashSet<TypeId>,
+    pub(crate) spelled_enums: rustc_hash::FxHashSet<TypeId>,
     /// STRUCT EXTENDS.
     pub(crate) struct_bases: HashMap<TypeId, TypeId>,
     pub(crate) program: Program,
@@ -89,6 +89,10 @@ pub(crate) struct Compiler<'a> {
     /// Next free byte of the image.
     pub(crate) next: u64,
     /// Statements that set what cannot be bytes, with the unit whose names they use.
+    /// Where the longest run of zeros lies in the program's data, and its bytes.
+    pub(crate) zeros: (u32, u32),
+    /// Initial bytes too far behind to be kept with the others.
+    pub(crate) far: Vec<(u32, Vec<u8>)>,
     pub(crate) late: Vec<(Option<usize>, Option<&'a tree::Home>, crate::initial::Late<'a>)>,
 }
 
@@ -102,37 +106,37 @@ impl<'a> Compiler<'a> {
             user_files: input.sources.len(),
             diagnostics,
             types: Types::default(),
-            names: HashMap::new(),
-            library_names: HashMap::new(),
+            names: HashMap::default(),
+            library_names: HashMap::default(),
             addresses: Default::default(),
-            declared_at: HashMap::new(),
+            declared_at: HashMap::default(),
             pous: Vec::new(),
             declared: Vec::new(),
             globals: Vec::new(),
             lists: Vec::new(),
-            list_names: HashMap::new(),
+            list_names: HashMap::default(),
             interfaces: Vec::new(),
-            interface_of_type: HashMap::new(),
+            interface_of_type: HashMap::default(),
             extends: Vec::new(),
             implements: Vec::new(),
             classes: Vec::new(),
             methods: Default::default(),
             families: Vec::new(),
-            type_late: HashMap::new(),
+            type_late: HashMap::default(),
             namespaces: Vec::new(),
             home: None,
             inside: Vec::new(),
             in_library: false,
-            unknown: HashMap::new(),
+            unknown: HashMap::default(),
             heap: false,
-            native_blocks: HashMap::new(),
-            type_init: HashMap::new(),
-            pou_of_type: HashMap::new(),
+            native_blocks: HashMap::default(),
+            type_init: HashMap::default(),
+            pou_of_type: HashMap::default(),
             strict_enums: Default::default(),
             spelled_enums: Default::default(),
-            struct_bases: HashMap::new(),
+            struct_bases: HashMap::default(),
             program: Program::default(),
-            natives: HashMap::new(),
+            natives: HashMap::default(),
             sites: Sites::new(files),
             queue: Vec::new(),
             depth: 0,
@@ -140,6 +144,8 @@ impl<'a> Compiler<'a> {
             block_kinds: Vec::new(),
             kept_ranges: Default::default(),
             next: takt_ir::NULL_ZONE.into(),
+            zeros: (0, 0),
+            far: Vec::new(),
             late: Vec::new(),
         }
     }

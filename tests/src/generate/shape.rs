@@ -187,6 +187,9 @@ pub struct Signature {
     pub recursive: bool,
 }
 
+/// Bytes of a variable of data: structures of arrays of structures would soon fill the memory.
+const LARGEST: u64 = 1 << 16;
+
 impl Generator {
     /// The type as it is written in a declaration.
     pub(super) fn spell(&self, shape: &Shape) -> String {
@@ -228,8 +231,25 @@ impl Generator {
         }
     }
 
-    /// Any type of data: no block, no pointer.
+    /// Bytes of a variable, about.
+    pub(super) fn bytes(&self, shape: &Shape) -> u64 {
+        match shape {
+            Shape::Scalar(s) => u64::from(s.bits / 8),
+            Shape::Text(n) => u64::from(*n) + 1,
+            Shape::Wide(n) => 2 * (u64::from(*n) + 1),
+            Shape::Structure(i) => self.structures[*i].fields.iter().map(|(_, field)| self.bytes(field).next_multiple_of(8)).sum(),
+            Shape::Array(elem, dims) => dims.iter().fold(self.bytes(elem), |all, (l, h)| all.saturating_mul((h - l + 1) as u64)),
+            _ => 8,
+        }
+    }
+
+    /// Any type of data that is not large: no block, no pointer.
     pub(super) fn data(&mut self, depth: usize) -> Shape {
+        let shape = self.any_data(depth);
+        if self.bytes(&shape) <= LARGEST { shape } else { self.leaf() }
+    }
+
+    fn any_data(&mut self, depth: usize) -> Shape {
         match self.random.below(12) {
             0 | 1 if depth > 0 => self.array(depth),
             2 | 3 if !self.structures.is_empty() => Shape::Structure(self.random.below(self.structures.len())),
@@ -240,7 +260,7 @@ impl Generator {
     /// An array of data, of one to three dimensions.
     pub(super) fn array(&mut self, depth: usize) -> Shape {
         let dims = (0..self.random.pick(&[1, 1, 1, 2, 2, 3])).map(|_| self.bounds()).collect();
-        Shape::Array(Box::new(self.data(depth - 1)), dims)
+        Shape::Array(Box::new(self.any_data(depth - 1)), dims)
     }
 
     fn bounds(&mut self) -> (i64, i64) {

@@ -3,7 +3,8 @@
 use super::Section;
 use crate::scope::key;
 use crate::unit::Compiler;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
+use std::collections::BTreeSet;
 use takt_ir::{Address, Area, Mapped, Program, StructKind, Type, TypeId};
 use takt_syntax::tree::{VarDecl, VarKind};
 use takt_syntax::{Code, Note, Span};
@@ -68,7 +69,7 @@ impl<'a> Compiler<'a> {
     /// Joins what waits for addresses with those that VAR_CONFIG gives, and tells what is left on either side.
     pub(crate) fn map(&mut self, program: &mut Program) {
         let entries = std::mem::take(&mut self.addresses.entries);
-        let mut given: HashMap<(u32, TypeId), (usize, bool)> = HashMap::new();
+        let mut given: HashMap<(u32, TypeId), (usize, bool)> = HashMap::default();
         for (i, (decl, ..)) in entries.iter().enumerate() {
             let Some(place) = self.entry_place(program, decl) else { continue };
             if let Some((first, _)) = given.insert((place.offset, place.ty), (i, false)) {
@@ -161,8 +162,8 @@ impl<'a> Compiler<'a> {
                 found(self, Found { area, span, offset: global.offset, ty: global.ty, many: false }, &name);
             }
         }
-        let mut walk = Walk { types: &program.types, known, holds: HashMap::new(), path: String::new(), many: false };
-        let mut seen = HashSet::new();
+        let mut walk = Walk { types: &program.types, known, holds: HashMap::default(), path: String::new(), many: false };
+        let mut seen = HashSet::default();
         for global in &program.globals {
             if seen.insert((global.offset, global.ty)) {
                 walk.path.clone_from(&global.name);

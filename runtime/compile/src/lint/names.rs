@@ -1,7 +1,7 @@
 //! The names that stand in a unit, and what is done with them.
 
 use crate::scope::{Head, key};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap as HashMap;
 use takt_syntax::tree::{
     Arg, ArgKind, AssignOp, CaseLabel, Expr, ExprKind, Init, InitItem, Stmt, StmtKind, TypeExpr, TypeExprKind, VarDecl,
 };
@@ -28,7 +28,7 @@ pub(super) struct Names<'a> {
 
 /// The same by key.
 pub(super) fn folded(names: HashMap<&str, u8>) -> HashMap<String, u8> {
-    let mut folded = HashMap::with_capacity(names.len());
+    let mut folded = HashMap::with_capacity_and_hasher(names.len(), Default::default());
     for (name, how) in names {
         *folded.entry(key(name)).or_insert(0) |= how;
     }

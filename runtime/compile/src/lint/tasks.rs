@@ -5,7 +5,8 @@
 
 use crate::scope::{PouKind, Storage};
 use crate::unit::Compiler;
-use std::collections::{BTreeSet, HashMap};
+use rustc_hash::FxHashMap as HashMap;
+use std::collections::BTreeSet;
 use takt_ir::{Base, Body, CallGraph, Inst, Local, Program, StructKind, Ty, Type, TypeId};
 use takt_syntax::{Code, Note, Span};
 
