@@ -5,9 +5,9 @@ use crate::pack::Pack;
 use takt_ir::{Place, Program, TypeId};
 
 /// Variables that may be forced at the same time.
-const MOST: usize = 1024;
+pub const FORCES: usize = 1024;
 /// Bytes of their values, and as many again for what was there before.
-const ROOM: usize = 1 << 16;
+pub const FORCED_BYTES: usize = 1 << 16;
 
 /// A variable that is held at a value.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +41,7 @@ pub(crate) struct Forces {
 
 impl Default for Forces {
     fn default() -> Self {
-        Self { list: Vec::with_capacity(MOST), values: Vec::with_capacity(ROOM), before: Vec::with_capacity(ROOM) }
+        Self { list: Vec::with_capacity(FORCES), values: Vec::with_capacity(FORCED_BYTES), before: Vec::with_capacity(FORCED_BYTES) }
     }
 }
 
@@ -86,8 +86,8 @@ impl Forces {
             self.values[span].copy_from_slice(bytes);
             return Ok(());
         }
-        if self.list.len() == MOST || self.values.len() + bytes.len() > ROOM {
-            return Err(AccessError::TooManyForces { most: MOST, bytes: ROOM });
+        if self.list.len() == FORCES || self.values.len() + bytes.len() > FORCED_BYTES {
+            return Err(AccessError::TooManyForces { most: FORCES, bytes: FORCED_BYTES });
         }
         self.list.push(Force { place, mask, len: bytes.len() as u32 });
         self.values.extend_from_slice(bytes);

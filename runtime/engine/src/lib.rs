@@ -39,7 +39,7 @@ pub use checkpoint::{Checkpoint, CheckpointError};
 pub use command::{AccessError, Command, CommandError, writable};
 pub use engine::{Engine, StopHandle};
 pub use fault::{FaultRecord, Frame};
-pub use force::Forced;
+pub use force::{FORCED_BYTES, FORCES, Forced};
 pub use limits::{Alarm, Limits};
 pub use load::{LoadError, WireProblem, load};
 pub use observe::{Observer, Scanned};

@@ -3,6 +3,7 @@
 use crate::platform;
 use crate::realtime::system;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 use takt_abi::Time;
 
 /// Machine time 0 under the real clock, in nanoseconds of the system's monotonic clock.
@@ -25,9 +26,23 @@ pub fn alarm() -> Option<Box<dyn takt_engine::Alarm>> {
     None
 }
 
-/// Monotonic time since the process first asked.
+/// Nanoseconds for which machine time stood still.
+static HELD: AtomicU64 = AtomicU64::new(0);
+
+/// Nanoseconds for which machine time stood still, because somebody paused the machine.
+pub fn held() -> u64 {
+    HELD.load(Ordering::Relaxed)
+}
+
+/// Monotonic time since the process first asked, without the time in which the machine was paused.
 pub fn machine_time() -> Time {
-    Time(nanoseconds() as i64)
+    Time(nanoseconds() as i64 - held() as i64)
+}
+
+/// Machine time goes on from here: to be called when a paused machine goes on, by the thread that steps it. It never goes forward.
+pub fn go_on_from(time: Time) {
+    let ahead = machine_time().0.saturating_sub(time.0).max(0);
+    HELD.fetch_add(ahead as u64, Ordering::Relaxed);
 }
 
 /// How machine time is paced.
@@ -77,7 +92,7 @@ impl Pace {
     fn sleep_until(&self, time: Time, stop: fn() -> bool) {
         let wake = time.0.saturating_sub(self.spin.0);
         while machine_time().0 < wake && !stop() {
-            system::sleep_until(origin().saturating_add_signed(wake));
+            system::sleep_until((origin() + held()).saturating_add_signed(wake));
         }
         while machine_time() < time && !stop() {
             std::hint::spin_loop();

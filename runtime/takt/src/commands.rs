@@ -1,9 +1,11 @@
 //! The command line (DESIGN §9): one file per command.
 
 mod check;
+mod ctl;
 mod explain;
 mod import;
 mod live;
+mod log;
 mod outputs;
 mod run;
 mod said;
@@ -35,11 +37,15 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Runs a program or a project.
-    Run(RunArgs),
+    Run(Box<RunArgs>),
     /// Finds the mistakes in a program or a project.
     Check(CheckArgs),
     /// Makes a project of TwinCAT's files, PLCopen XML or ST.
     Import(ImportArgs),
+    /// Looks at a machine that runs, and changes what it does.
+    Ctl(ctl::CtlArgs),
+    /// Shows the journal: what happened on a machine, and who did it.
+    Log(LogArgs),
     /// Explains a code like E0301.
     Explain(ExplainArgs),
 }
@@ -80,6 +86,9 @@ pub struct RunArgs {
     /// Where the machine keeps its state. Default: .takt in the project's folder, in real time only.
     #[arg(long, value_name = "DIR")]
     pub state: Option<PathBuf>,
+    /// Serves `takt ctl` at this socket. Default: in the state folder, in real time only.
+    #[arg(long, value_name = "SOCKET")]
+    pub control: Option<PathBuf>,
     /// Writes the statistics of the tasks at the end.
     #[arg(long, value_name = "FILE.json|csv")]
     pub stats: Option<PathBuf>,
@@ -113,6 +122,32 @@ struct ImportArgs {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Which machine is meant.
+#[derive(Debug, Clone, Args)]
+struct Where {
+    /// The project's folder, or its source file. Default: the folder one is in.
+    #[arg(value_name = "PATH", default_value = ".")]
+    path: PathBuf,
+    /// The state folder, if the run has one of its own.
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+struct LogArgs {
+    #[command(flatten)]
+    machine: Where,
+    /// Goes on with what is written while it looks.
+    #[arg(short, long)]
+    follow: bool,
+    /// How many lines; 0 for all that are kept.
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 100)]
+    lines: usize,
+    /// The lines as they are: one JSON object each.
     #[arg(long)]
     json: bool,
 }
@@ -176,6 +211,8 @@ pub fn execute(cli: Cli) -> Exit {
         Command::Run(args) => run::execute(&args),
         Command::Check(args) => check::execute(&args.paths, args.format),
         Command::Import(args) => import::execute(&args),
+        Command::Ctl(args) => ctl::execute(&args),
+        Command::Log(args) => log::execute(&args),
         Command::Explain(args) => explain::execute(args.code.as_deref()),
     }
 }
@@ -187,7 +224,7 @@ mod tests {
     fn run(arguments: &[&str]) -> Result<RunArgs, clap::Error> {
         let cli = Cli::try_parse_from(["takt", "run"].iter().chain(arguments))?;
         match cli.command {
-            Command::Run(args) => Ok(args),
+            Command::Run(args) => Ok(*args),
             other => panic!("not a run: {other:?}"),
         }
     }

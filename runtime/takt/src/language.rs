@@ -80,6 +80,14 @@ words! {
     Interrupted "interrupted" "被中断",
     StatisticsWritten "Statistics" "统计",
     Running "running" "运行",
+    WaitsForReset "The machine waits: `takt ctl reset` starts the program anew, Ctrl-C ends the run." "机器等待中:`takt ctl reset` 重新启动程序,Ctrl-C 结束运行。",
+    ReasonNeeded "who changes a machine says why: --reason TEXT (and --as NAME); it goes into the journal" "更改机器须说明原因:--reason TEXT(以及 --as NAME);会写入日志",
+    HeldUntil "Held until this command ends (Ctrl-C)." "保持到本命令结束(Ctrl-C)。",
+    Done "done" "完成",
+    Forced "forced" "个变量被强制",
+    NothingForced "nothing is forced" "没有强制变量",
+    JournalFails "  the journal cannot be written" "  日志无法写入",
+    NoJournal "A machine writes it while it runs in real time: `takt run PATH --speed real`, or with --state DIR." "机器以实时方式运行时写入:`takt run PATH --speed real`,或使用 --state DIR。",
     DefectOfTakt "This is a defect of Takt. Please report it with the program that shows it." "这是 Takt 的缺陷,请附上程序报告。",
 }
 

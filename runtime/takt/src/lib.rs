@@ -3,11 +3,14 @@
 //! Only this crate touches files, wall clocks and serialization for the tool's own purposes. Everything a command does can be called as a library:
 //! [`project::load`] reads a project, [`machine::Machine::new`] makes it run.
 
+pub mod attached;
 pub mod clock;
 pub mod commands;
 pub mod console;
+pub mod control;
 
 pub mod host;
+pub mod journal;
 pub mod language;
 pub mod machine;
 pub mod manifest;

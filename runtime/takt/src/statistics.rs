@@ -3,12 +3,17 @@
 use crate::language::{Language, Word};
 use crate::machine::Machine;
 use serde_json::{Value, json};
-use takt_engine::{Engine, TaskStatistics};
+use takt_engine::{Engine, FaultRecord, TaskStatistics};
 use takt_ir::{Program, Task, Trigger};
 
 /// What a task is doing: `running`; `fault` where it stopped the application; `stopped` where another did, or somebody.
 pub fn state(engine: &Engine, task: &Task) -> &'static str {
-    match engine.fault() {
+    state_with(engine.fault(), task)
+}
+
+/// The same, of the fault that stopped the application.
+pub fn state_with(fault: Option<&FaultRecord>, task: &Task) -> &'static str {
+    match fault {
         None => "running",
         Some(record) if record.fault != takt_abi::Fault::Stopped && record.task == task.name => "fault",
         Some(_) => "stopped",
@@ -25,20 +30,23 @@ fn trigger(task: &Task) -> (&'static str, Option<i64>) {
 
 /// All tasks, in the order of the program. Times are nanoseconds.
 pub fn to_json(program: &Program, engine: &Engine) -> Value {
-    let task = |(i, task): (usize, &Task)| {
-        let TaskStatistics { cycles, overruns, preempted, fuel_max, scan_ns, jitter_ns } = engine.statistics(i);
-        let (kind, interval) = trigger(task);
-        json!({
-            "name": task.name, "state": state(engine, task), "kind": kind, "interval_ns": interval, "priority": task.priority,
-            "cycles": cycles, "overruns": overruns, "preempted": preempted, "fuel_max": fuel_max,
-            "scan_ns": {
-                "last": scan_ns.last(), "mean": scan_ns.mean().round() as u64, "min": scan_ns.min(), "max": scan_ns.max(),
-                "p50": scan_ns.percentile(0.5), "p99": scan_ns.percentile(0.99),
-            },
-            "jitter_ns": { "p50": jitter_ns.percentile(0.5), "p99": jitter_ns.percentile(0.99), "max": jitter_ns.max() },
-        })
-    };
-    Value::Array(program.tasks.iter().enumerate().map(task).collect())
+    let tasks = program.tasks.iter().enumerate();
+    tasks.map(|(i, task)| task_to_json(task, state(engine, task), engine.statistics(i))).collect()
+}
+
+/// One task.
+pub fn task_to_json(task: &Task, state: &str, statistics: &TaskStatistics) -> Value {
+    let TaskStatistics { cycles, overruns, preempted, fuel_max, scan_ns, jitter_ns } = statistics;
+    let (kind, interval) = trigger(task);
+    json!({
+        "name": task.name, "state": state, "kind": kind, "interval_ns": interval, "priority": task.priority,
+        "cycles": cycles, "overruns": overruns, "preempted": preempted, "fuel_max": fuel_max,
+        "scan_ns": {
+            "last": scan_ns.last(), "mean": scan_ns.mean().round() as u64, "min": scan_ns.min(), "max": scan_ns.max(),
+            "p50": scan_ns.percentile(0.5), "p99": scan_ns.percentile(0.99),
+        },
+        "jitter_ns": { "p50": jitter_ns.percentile(0.5), "p99": jitter_ns.percentile(0.99), "max": jitter_ns.max() },
+    })
 }
 
 /// The same as a table with a header line.

@@ -3,8 +3,10 @@
 use super::outputs::{Outputs, Writer, warning};
 use super::said::Teller;
 use super::{EngineKind, Exit, Format, RunArgs, Speed, check, summary};
+use crate::attached::{Attached, Places};
 use crate::clock::{self, Pace};
 use crate::console;
+use crate::journal::{Entry, Event};
 use crate::language::{self, Word};
 use crate::machine::{BuildError, End, Machine, Setup};
 use crate::project::{self, Project};
@@ -40,9 +42,14 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     let speed = speed(args, &project);
     let mut machine = build(args, &project, speed)?;
     let real = speed == Speed::Factor(1.0);
-    let _state = state::of_run(&project, args.state.as_deref(), real).map_err(|error| usage(&error.to_string()))?;
+    let state = state::of_run(&project, args.state.as_deref(), real).map_err(|error| usage(&error.to_string()))?;
+    let places_of_it = Places::of(state.as_ref().map(state::State::path), args.control.as_deref());
+    let mut attached = Attached::open(&places_of_it, &project, &mut machine, real).map_err(|error| usage(&error))?;
     for (variable, value) in &args.set {
+        let old = machine.literal(variable).ok();
         machine.set(variable, value).map_err(|error| usage(&format!("--set {variable}: {error}")))?;
+        let entry = Entry::new(Event::Write).by("", "takt run --set", "");
+        attached.post(entry.variable(variable).values(old, machine.literal(variable).ok()));
     }
     let printed = places(&machine, &args.print, "--print")?;
     let stats = args.stats.as_deref().map(|path| summary::statistics_file(path).map_err(|error| usage(&error))).transpose()?;
@@ -60,10 +67,11 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         Speed::Factor(factor) => Some(factor),
     });
     let pace = if real { pace.spinning(settings.spin) } else { pace };
-    let over = turn(args, &mut machine, &pace, |machine| {
+    let over = turn(args, &mut machine, &pace, &mut attached, |machine| {
         teller.scanned(machine);
         writer.scanned(machine);
     });
+    attached.post(Entry::new(Event::Stop).at(machine.now()).message(summary::ended(&over)));
     let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
     let disturbances = held.as_ref().map(|_| system::disturbances().since(before));
     drop(held);
@@ -166,7 +174,9 @@ fn literal(machine: &Machine, place: Place) -> String {
 }
 
 /// Steps until something ends the run; `seen` looks at the machine after each scan of the fastest task. Nothing here allocates.
-fn turn(args: &RunArgs, machine: &mut Machine, pace: &Pace, mut seen: impl FnMut(&mut Machine)) -> Over {
+fn turn(args: &RunArgs, machine: &mut Machine, pace: &Pace, attached: &mut Attached, mut seen: impl FnMut(&mut Machine)) -> Over {
+    let endless = args.cycles.is_none() && args.duration.is_none() && args.until.is_none() && !machine.is_demonstration();
+    let stays = endless && attached.is_reachable();
     loop {
         if args.cycles.is_some_and(|cycles| machine.cycles() >= cycles) {
             return Over::Cycles;
@@ -174,20 +184,41 @@ fn turn(args: &RunArgs, machine: &mut Machine, pace: &Pace, mut seen: impl FnMut
         if args.duration.is_some_and(|duration| machine.elapsed() >= duration) {
             return Over::Duration;
         }
-        let now = pace.wait(machine.engine().next_release());
-        if platform::stop_requested() {
+        let release = machine.engine().next_release();
+        let now = if attached.is_held() { release } else { pace.wait(release) };
+        if platform::stop_requested() || attached.end_requested() {
+            let fault = machine.fault().is_some_and(|record| record.fault != takt_abi::Fault::Stopped);
             rest(machine, pace);
-            return Over::Stopped;
+            return if fault { Over::End(End::Fault) } else { Over::Stopped };
         }
-        if machine.step_at(now) {
+        let scanned = machine.step_at(now);
+        if scanned {
             seen(machine);
         }
-        if let Some(end) = machine.ended() {
-            if !pace.is_max() {
-                rest(machine, pace);
+        attached.stepped(machine, scanned);
+        match machine.ended() {
+            Some(End::Fault) if stays => tell_fault(machine, attached),
+            Some(end) => {
+                if !pace.is_max() {
+                    rest(machine, pace);
+                }
+                return Over::End(end);
             }
-            return Over::End(end);
+            None => _ = attached.newly_faulted(false),
         }
+        if attached.is_held() {
+            attached.stand_still(machine, platform::stop_requested);
+        }
+    }
+}
+
+/// Says once that the program has faulted, and that the machine waits for somebody.
+fn tell_fault(machine: &Machine, attached: &mut Attached) {
+    if attached.newly_faulted(true)
+        && let Some(record) = machine.fault()
+    {
+        let language = language::of_environment();
+        console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}\n{}", Word::Fault.text(language), Word::WaitsForReset.text(language)));
     }
 }
 

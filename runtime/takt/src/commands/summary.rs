@@ -112,6 +112,19 @@ pub(super) fn tell(project: &Project, machine: &Machine, over: &Over, wall: Opti
     }
 }
 
+/// How a run ended, for the journal.
+pub(super) fn ended(over: &Over) -> String {
+    match over {
+        Over::End(End::Fault) => "with a fault".into(),
+        Over::End(End::Until) => "its condition came true".into(),
+        Over::End(End::Done) => "the demonstration is over".into(),
+        Over::End(End::TimedOut { waiting_for }) => format!("the demonstration timed out, waiting for {waiting_for}"),
+        Over::End(End::Condition { text, fault }) => format!("{text}: {fault}"),
+        Over::Cycles | Over::Duration => "it has run as long as it was to".into(),
+        Over::Stopped => "on request".into(),
+    }
+}
+
 fn why(over: &Over, language: Language) -> Option<String> {
     match over {
         Over::Stopped => Some(Word::Stopped.text(language).into()),

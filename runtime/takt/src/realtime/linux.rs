@@ -215,7 +215,10 @@ impl Alarm for SignalAlarm {
             return;
         }
         self.armed = at;
-        let setting = libc::itimerspec { it_interval: timespec(0), it_value: timespec(self.origin.saturating_add_signed(at.0).max(1)) };
+        let setting = libc::itimerspec {
+            it_interval: timespec(0),
+            it_value: timespec((self.origin + crate::clock::held()).saturating_add_signed(at.0).max(1)),
+        };
         // SAFETY: reads one setting from a valid pointer; the timer lives as long as this value.
         unsafe { libc::timer_settime(self.timer, libc::TIMER_ABSTIME, &raw const setting, std::ptr::null_mut()) };
     }
