@@ -2,6 +2,7 @@
 
 mod check;
 mod ctl;
+mod doctor;
 mod explain;
 mod import;
 mod live;
@@ -9,6 +10,7 @@ mod log;
 mod outputs;
 mod run;
 mod said;
+mod service;
 mod summary;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -46,6 +48,10 @@ enum Command {
     Ctl(ctl::CtlArgs),
     /// Shows the journal: what happened on a machine, and who did it.
     Log(LogArgs),
+    /// Examines the computer: what it offers a machine, what is missing, how to get it.
+    Doctor(DoctorArgs),
+    /// Lets a project start with the computer, as a systemd service.
+    Service(ServiceArgs),
     /// Explains a code like E0301.
     Explain(ExplainArgs),
 }
@@ -153,6 +159,66 @@ struct LogArgs {
 }
 
 #[derive(Debug, Clone, Args)]
+struct DoctorArgs {
+    /// A project folder: its [realtime] and its state folder are looked at too.
+    #[arg(value_name = "PATH")]
+    path: Option<PathBuf>,
+    /// The state folder, if it is not the project's own.
+    #[arg(long, value_name = "DIR", requires = "path")]
+    state: Option<PathBuf>,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+    /// Examines the files of a computer below this folder: proc, sys, dev.
+    #[arg(long, value_name = "DIR", default_value = "/", hide = true)]
+    root: PathBuf,
+}
+
+/// What is to be done with a service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ServiceAction {
+    /// Writes the unit and lets it start with the computer.
+    Install,
+    /// Stops it and takes the unit away.
+    Uninstall,
+    /// Says whether it runs.
+    Status,
+    /// Prints the unit.
+    Show,
+}
+
+#[derive(Debug, Clone, Args)]
+struct ServiceArgs {
+    /// What is to be done.
+    #[arg(value_name = "ACTION")]
+    action: ServiceAction,
+    /// A project folder (with takt.toml) or a source file.
+    #[arg(value_name = "PATH")]
+    path: PathBuf,
+    /// Who it runs as. Default: who asks.
+    #[arg(long, value_name = "NAME")]
+    user: Option<String>,
+    /// Name of the service. Default: takt- and the name of the project.
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// The state folder, if it is not the project's own.
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
+    /// Says what would be done.
+    #[arg(long)]
+    dry_run: bool,
+    /// The computer's files lie below this folder.
+    #[arg(long, value_name = "DIR", default_value = "/", hide = true)]
+    root: PathBuf,
+}
+
+impl ServiceArgs {
+    fn is_this_computer(&self) -> bool {
+        self.root == std::path::Path::new("/")
+    }
+}
+
+#[derive(Debug, Clone, Args)]
 struct ExplainArgs {
     /// E0301, W0301, …; without one all codes are listed.
     code: Option<String>,
@@ -213,6 +279,8 @@ pub fn execute(cli: Cli) -> Exit {
         Command::Import(args) => import::execute(&args),
         Command::Ctl(args) => ctl::execute(&args),
         Command::Log(args) => log::execute(&args),
+        Command::Doctor(args) => doctor::execute(&args),
+        Command::Service(args) => service::execute(&args),
         Command::Explain(args) => explain::execute(args.code.as_deref()),
     }
 }

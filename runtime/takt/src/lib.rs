@@ -8,6 +8,7 @@ pub mod clock;
 pub mod commands;
 pub mod console;
 pub mod control;
+pub mod doctor;
 
 pub mod host;
 pub mod journal;
@@ -26,4 +27,5 @@ pub mod spelling;
 pub mod state;
 pub mod statistics;
 pub mod trace;
+pub mod unit;
 pub mod values;
