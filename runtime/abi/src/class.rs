@@ -26,6 +26,10 @@ impl Classes {
         let entry = offset.is_multiple_of(GRANULE).then(|| self.0.get((offset / GRANULE) as usize)).flatten();
         entry.map_or(0, |class| class.load(Relaxed))
     }
+    /// Becomes like another table for an image of the same size.
+    pub fn copy(&self, other: &Self) {
+        self.0.iter().zip(&*other.0).for_each(|(to, from)| to.store(from.load(Relaxed), Relaxed));
+    }
     /// Appends the entries that are not 0, as number of the granule and class, for a checkpoint.
     pub fn save_into(&self, out: &mut Vec<u8>) {
         for (granule, class) in self.0.iter().enumerate() {

@@ -121,7 +121,7 @@ pub trait Host {
     /// The completion of a request, once, if it has been latched. On an error the buffer is lost.
     fn take(&mut self, ticket: Ticket) -> Option<Result<Chunk, HostError>>;
     /// Requests under way and completions, for a checkpoint in the same process; waits for the former. `None`: it cannot.
-    fn save(&mut self) -> Option<Box<dyn Any>> {
+    fn save(&mut self) -> Option<Box<dyn Any + Send>> {
         None
     }
     /// Puts back what [`Host::save`] gave; false, and unchanged, when it is not that. Files stay as they are.

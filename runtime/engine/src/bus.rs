@@ -134,7 +134,7 @@ pub trait IoDriver {
     /// Sends the outputs and receives the inputs. `now` is the start of the bus cycle. Must not allocate, lock or panic.
     fn exchange(&mut self, now: Time, io: &mut ProcessImage) -> Result<(), IoFault>;
     /// What is behind the bus, for a checkpoint in the same process. `None`: it cannot be put back (a real machine), or there is nothing.
-    fn save(&self) -> Option<Box<dyn Any>> {
+    fn save(&self) -> Option<Box<dyn Any + Send>> {
         None
     }
     /// Puts back what [`IoDriver::save`] gave; false, and unchanged, when it is not that.

@@ -25,8 +25,8 @@ pub struct Checkpoint {
     image: Vec<u8>,
     state: Vec<u8>,
     /// What is behind the bus, and requests to the host; only in the process that took it.
-    driver: Option<Box<dyn Any>>,
-    host: Option<Box<dyn Any>>,
+    driver: Option<Box<dyn Any + Send>>,
+    host: Option<Box<dyn Any + Send>>,
 }
 
 impl std::fmt::Debug for Checkpoint {

@@ -140,6 +140,9 @@ pub fn writable(program: &Program, place: Place) -> Result<(std::ops::Range<usiz
 impl Engine {
     /// Does what is commanded. Allocates nothing, except for the record of a reset that fails.
     pub fn command(&mut self, command: &Command) -> Result<(), CommandError> {
+        if !matches!(command, Command::Reset(_) | Command::Halt) {
+            self.tell(command);
+        }
         match command {
             Command::Write { place, bytes } => self.put(*place, bytes, false)?,
             Command::Force { place, bytes } => self.put(*place, bytes, true)?,

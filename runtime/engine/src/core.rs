@@ -14,6 +14,7 @@ use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned, execute};
 use crate::observe::Observer;
 use crate::options::{Clock, Preemption};
+use crate::replay::{Recorder, Script};
 use crate::retain::{Keeper, Reset, Restore};
 use crate::schedule::TaskState;
 use crate::system::SystemInfo;
@@ -64,6 +65,9 @@ pub(crate) struct Core {
     pub preempt: Vec<Preemption>,
     /// What happened (real clock).
     pub recorded: Vec<Preemption>,
+    pub recorder: Option<Box<dyn Recorder>>,
+    /// The recording that is obeyed.
+    pub script: Option<Script>,
     pub stop: Arc<AtomicBool>,
     pub fault: Option<RawFault>,
     pub record: OnceCell<FaultRecord>,
@@ -89,6 +93,9 @@ impl Core {
     /// Runs what is due at `now`.
     pub fn step(&mut self, now: Time) {
         self.now = now;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.step(now);
+        }
         if self.steps == 0 {
             for task in &mut self.tasks {
                 task.release = now;
@@ -101,6 +108,7 @@ impl Core {
         }
         for _ in 0..SCANS_IN_A_STEP.max(self.tasks.len() as u32) {
             let Some((task, now)) = self.pick(now) else { break };
+            self.tell_scan(task, now, 0);
             self.release(task, now);
             if self.fault.is_some() || self.stop.load(Ordering::Relaxed) {
                 break;
@@ -130,6 +138,11 @@ impl Core {
 
     /// The most important task that is due and has not run in this step; under a real clock also one that has become due again while others wait.
     fn pick(&mut self, now: Time) -> Option<(usize, Time)> {
+        if self.script.is_some() {
+            let told = self.pick_as_told();
+            self.watch_events(told.map_or(now, |(_, now)| now));
+            return told;
+        }
         let now = match self.clock {
             Clock::Virtual => now,
             Clock::Real(clock) => clock().max(now),
@@ -208,6 +221,8 @@ impl Core {
 
     fn leave(&mut self, index: usize, outer: Outer) {
         let ended = self.clock_now();
+        let now = self.env.get().now;
+        self.leave_as_told(index, now);
         let task = &mut self.tasks[index];
         task.running = false;
         let used = task.granted.saturating_sub_signed(task.lane.get().ctx.fuel);
@@ -270,8 +285,9 @@ impl Core {
             Clock::Real(_) => until = until.min(consumed.saturating_add(self.slice())),
             Clock::Virtual => {
                 until = until.min(consumed.saturating_add(STOP_SLICE));
-                if let Some(next) = self.next_preemption(index) {
-                    until = until.min(next.at_fuel.saturating_sub(1).max(consumed));
+                let told = if self.script.is_some() { self.next_told() } else { self.next_preemption(index).map(|next| next.at_fuel) };
+                if let Some(at) = told {
+                    until = until.min(at.saturating_sub(1).max(consumed));
                 }
             }
         }
@@ -300,18 +316,24 @@ impl Core {
             return Some(Fault::Watchdog);
         };
         let consumed = self.tasks[index].granted.saturating_add_signed(ctx.fuel.saturating_neg());
+        if self.script.is_some()
+            && let Some(fault) = self.poll_as_told(index, consumed)
+        {
+            return Some(fault);
+        }
         if consumed > self.fuel_limit_of(index) {
-            return Some(Fault::Watchdog);
+            return self.tell_cut(consumed, Fault::Watchdog);
         }
         if self.stop.load(Ordering::Relaxed) {
-            return Some(Fault::Stopped);
+            return self.tell_cut(consumed, Fault::Stopped);
         }
         match self.clock {
+            Clock::Virtual if self.script.is_some() => {}
             Clock::Virtual => self.preempt_as_told(index, consumed),
             Clock::Real(clock) => {
                 Self::hear_alarm(ctx);
                 if self.too_long(index, clock()) {
-                    return Some(Fault::Watchdog);
+                    return self.tell_cut(consumed, Fault::Watchdog);
                 }
                 self.preempt_if_due(index, consumed, clock);
                 self.set_alarm(index);
@@ -334,7 +356,7 @@ impl Core {
             let higher = self.tasks.iter().enumerate().filter(|(_, t)| t.priority < priority && !t.running);
             let next = higher.filter_map(|(i, t)| Some((t.next_release()?, t.priority, i))).min();
             if let Some((release, _, i)) = next {
-                self.interrupt(index, i, release.max(self.now));
+                self.interrupt(index, i, release.max(self.now), consumed);
             }
         }
     }
@@ -350,14 +372,15 @@ impl Core {
             if self.recorded.len() < RECORDED {
                 self.recorded.push(Preemption { cycle: self.tasks[index].statistics.cycles, task: index, at_fuel: consumed });
             }
-            self.interrupt(index, i, now);
+            self.interrupt(index, i, now, consumed);
         }
     }
 
     /// A scan of task `by` inside the one of `index`.
-    fn interrupt(&mut self, index: usize, by: usize, now: Time) {
+    pub fn interrupt(&mut self, index: usize, by: usize, now: Time, consumed: u64) {
         self.tasks[index].statistics.preempted += 1;
         self.now = self.now.max(now);
+        self.tell_scan(by, now, consumed);
         self.release(by, now);
     }
 
@@ -384,6 +407,9 @@ impl Core {
         let result = catch_unwind(AssertUnwindSafe(|| self.driver.exchange(now, &mut self.io)));
         self.io_fault = result.unwrap_or(Err(IoFault::Panic)).err();
         self.io_faults += u64::from(self.io_fault.is_some());
+        if let Some(recorder) = &mut self.recorder {
+            recorder.exchange(self.io_fault.map_or(Ok(()), Err), &self.io);
+        }
         self.stage.bus_answered(self.io_fault.is_none());
     }
 

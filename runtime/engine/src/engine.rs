@@ -3,6 +3,7 @@
 use crate::axis::stage::AxisStatus;
 use crate::bus::{IoFault, ProcessImage};
 use crate::command::AccessError;
+use crate::command::Command;
 use crate::core::Core;
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
@@ -126,17 +127,17 @@ impl Engine {
 
     /// Stops the application as a fault does, with [`Fault::Stopped`]: axes are brought to rest, outputs go to their safe values.
     pub fn halt(&mut self) {
+        self.tell(&Command::Halt);
         let core = &mut self.core;
-        let raw = RawFault {
-            fault: Fault::Stopped,
-            site: u32::MAX,
-            trace: [0; takt_abi::TRACE_DEPTH],
-            trace_len: 0,
-            task: Some(core.bus),
-            time: core.now,
-            cycle: core.tasks[core.bus].statistics.cycles,
-        };
-        core.stop_application(raw);
+        let cycle = core.tasks[core.bus].statistics.cycles;
+        core.stop_application(RawFault::outside(Fault::Stopped, core.bus, core.now, cycle));
+    }
+
+    /// Tells the recorder of a command.
+    pub(crate) fn tell(&mut self, command: &Command) {
+        if let Some(recorder) = &mut self.core.recorder {
+            recorder.command(command);
+        }
     }
 
     /// What the program said to people: the oldest message, once. Messages that nobody takes in time are lost, see [`Engine::lost_messages`].
@@ -157,6 +158,7 @@ impl Engine {
     /// Clears the fault and starts the program with its initial values, but for the variables that this kind of restart keeps: they keep what they hold
     /// now, after a fault too. Axes keep their reference. On an error the fault stays.
     pub fn reset(&mut self, kind: Reset) -> Result<(), Box<FaultRecord>> {
+        self.tell(&Command::Reset(kind));
         let core = &mut self.core;
         let kept = Restore::of_image(&core.program, kind, core.image.bytes());
         core.initialise(Some(&kept))?;

@@ -66,6 +66,10 @@ impl RawFault {
         let trace_len = (ctx.trace_len as usize).min(ctx.trace.len());
         Self { fault, site: ctx.fault_site, trace: ctx.trace, trace_len, task, time, cycle }
     }
+    /// Of a scan that was ended from outside; it has no place.
+    pub fn outside(fault: Fault, task: usize, time: Time, cycle: u64) -> Self {
+        Self { fault, site: u32::MAX, trace: [0; takt_abi::TRACE_DEPTH], trace_len: 0, task: Some(task), time, cycle }
+    }
     pub fn record(&self, program: &Program) -> FaultRecord {
         FaultRecord {
             fault: self.fault,

@@ -27,6 +27,7 @@ mod memory;
 mod observe;
 mod options;
 mod pack;
+mod replay;
 mod retain;
 mod schedule;
 mod statistics;
@@ -44,6 +45,7 @@ pub use limits::{Alarm, Limits};
 pub use load::{LoadError, WireProblem, load};
 pub use observe::{Observer, Scanned};
 pub use options::{Clock, ExecutorKind, Options, Preemption};
+pub use replay::{Event, Recorder, Strayed};
 pub use retain::{Reset, Restore, RetainLayout, Snapshot, SnapshotReader};
 pub use statistics::{Histogram, TaskStatistics};
 

@@ -110,9 +110,14 @@ impl Core {
     pub fn check_overruns(&mut self, index: usize, now: Time) -> bool {
         let task = &self.tasks[index];
         let Watched { limits, missed, .. } = task.watched;
+        if let Some(fault) = self.stop_as_told(true) {
+            self.stop_at_entry(index, fault, now);
+            return true;
+        }
         if !matches!(self.clock, Clock::Real(_)) || limits.max_overruns == 0 || missed < limits.max_overruns {
             return false;
         }
+        self.tell_stop(true, Fault::Overruns { count: missed });
         self.stop_at_entry(index, Fault::Overruns { count: missed }, now);
         true
     }
@@ -126,12 +131,13 @@ impl Core {
         }
         watched.slow = if took.0 > limits.watchdog.0 { watched.slow + 1 } else { 0 };
         if watched.slow >= limits.sensitivity.max(1) {
+            self.tell_stop(false, Fault::Watchdog);
             self.stop_at_entry(index, Fault::Watchdog, now);
         }
     }
 
     /// A fault that belongs to the task as a whole.
-    fn stop_at_entry(&mut self, index: usize, fault: Fault, now: Time) {
+    pub fn stop_at_entry(&mut self, index: usize, fault: Fault, now: Time) {
         let task = &self.tasks[index];
         let site = self.program.bodies.get(task.entry.0 as usize).map_or(u32::MAX, |body| body.entry_site.0);
         let raw = RawFault {

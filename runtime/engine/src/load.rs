@@ -202,6 +202,8 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         stopwatch: options.stopwatch,
         preempt,
         recorded,
+        recorder: None,
+        script: None,
         stop: Arc::default(),
         fault: None,
         record: OnceCell::new(),

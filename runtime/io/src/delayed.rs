@@ -38,11 +38,13 @@ impl IoDriver for Delayed {
         }
         Ok(())
     }
-    fn save(&self) -> Option<Box<dyn Any>> {
+    fn save(&self) -> Option<Box<dyn Any + Send>> {
         Some(Box::new((self.line.clone(), self.next, self.inner.save())))
     }
     fn restore(&mut self, saved: &dyn Any) -> bool {
-        let Some((line, next, inner)) = saved.downcast_ref::<(Vec<ProcessImage>, usize, Option<Box<dyn Any>>)>() else { return false };
+        let Some((line, next, inner)) = saved.downcast_ref::<(Vec<ProcessImage>, usize, Option<Box<dyn Any + Send>>)>() else {
+            return false;
+        };
         self.line.clone_from(line);
         self.next = *next;
         inner.as_ref().is_none_or(|inner| self.inner.restore(inner.as_ref()))

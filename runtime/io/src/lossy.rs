@@ -51,11 +51,11 @@ impl IoDriver for Lossy {
         }
         self.inner.exchange(now, io)
     }
-    fn save(&self) -> Option<Box<dyn Any>> {
+    fn save(&self) -> Option<Box<dyn Any + Send>> {
         Some(Box::new((self.state, self.left, self.inner.save())))
     }
     fn restore(&mut self, saved: &dyn Any) -> bool {
-        let Some((state, left, inner)) = saved.downcast_ref::<(u64, u32, Option<Box<dyn Any>>)>() else { return false };
+        let Some((state, left, inner)) = saved.downcast_ref::<(u64, u32, Option<Box<dyn Any + Send>>)>() else { return false };
         (self.state, self.left) = (*state, *left);
         inner.as_ref().is_none_or(|inner| self.inner.restore(inner.as_ref()))
     }

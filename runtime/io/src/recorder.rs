@@ -78,7 +78,7 @@ impl IoDriver for Recorder {
         ring.full |= ring.next == 0;
         result
     }
-    fn save(&self) -> Option<Box<dyn Any>> {
+    fn save(&self) -> Option<Box<dyn Any + Send>> {
         self.inner.save()
     }
     fn restore(&mut self, saved: &dyn Any) -> bool {

@@ -265,7 +265,7 @@ impl IoDriver for Sim {
         self.machine.borrow_mut().exchange(now, io);
         Ok(())
     }
-    fn save(&self) -> Option<Box<dyn Any>> {
+    fn save(&self) -> Option<Box<dyn Any + Send>> {
         Some(Box::new(self.machine.borrow().clone()))
     }
     fn restore(&mut self, saved: &dyn Any) -> bool {

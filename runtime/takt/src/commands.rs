@@ -8,6 +8,7 @@ mod import;
 mod live;
 mod log;
 mod outputs;
+mod replay;
 mod run;
 mod said;
 mod service;
@@ -40,6 +41,8 @@ pub struct Cli {
 enum Command {
     /// Runs a program or a project.
     Run(Box<RunArgs>),
+    /// Runs a recording again, bit for bit.
+    Replay(ReplayArgs),
     /// Finds the mistakes in a program or a project.
     Check(CheckArgs),
     /// Makes a project of TwinCAT's files, PLCopen XML or ST.
@@ -98,12 +101,52 @@ pub struct RunArgs {
     /// Writes the statistics of the tasks at the end.
     #[arg(long, value_name = "FILE.json|csv")]
     pub stats: Option<PathBuf>,
+    /// Records everything that decides the run besides the program, for `takt replay`.
+    #[arg(long, value_name = "FILE")]
+    pub record_inputs: Option<PathBuf>,
     /// One JSON object on standard output.
     #[arg(long)]
     pub json: bool,
     /// Draws the run: path, tool axes, speed, valve.
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
+}
+
+/// What `takt replay` is told.
+#[derive(Debug, Clone, Args)]
+struct ReplayArgs {
+    /// What `takt run --record-inputs` wrote.
+    file: PathBuf,
+    /// The program it was recorded with. Default: the project in this folder.
+    #[arg(value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Ends at this scan of the fastest task.
+    #[arg(long, value_name = "CYCLE")]
+    to: Option<u64>,
+    /// Ends when an ST condition becomes TRUE.
+    #[arg(long, value_name = "EXPR")]
+    until: Option<String>,
+    /// Then goes back by so many scans.
+    #[arg(long, value_name = "N")]
+    back: Option<u64>,
+    /// Shows a variable at the end.
+    #[arg(long, value_name = "VAR")]
+    print: Vec<String>,
+    /// Writes variables to a CSV file, one line per scan.
+    #[arg(long, value_name = "FILE", requires = "record")]
+    trace: Option<PathBuf>,
+    /// Variables of the trace.
+    #[arg(long, value_name = "VAR,…", value_delimiter = ',', requires = "trace")]
+    record: Vec<String>,
+    /// What runs the program.
+    #[arg(long, value_name = "ENGINE", default_value = "jit")]
+    engine: EngineKind,
+    /// Shows a hash of all variables and resources at every Nth scan.
+    #[arg(long, value_name = "N")]
+    hash: Option<u64>,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -275,6 +318,7 @@ fn assignment(text: &str) -> Result<(String, String), String> {
 pub fn execute(cli: Cli) -> Exit {
     match cli.command {
         Command::Run(args) => run::execute(&args),
+        Command::Replay(args) => replay::execute(&args),
         Command::Check(args) => check::execute(&args.paths, args.format),
         Command::Import(args) => import::execute(&args),
         Command::Ctl(args) => ctl::execute(&args),

@@ -89,7 +89,7 @@ impl Host for Files {
         Some(self.latched.swap_remove(i).result)
     }
 
-    fn save(&mut self) -> Option<Box<dyn Any>> {
+    fn save(&mut self) -> Option<Box<dyn Any + Send>> {
         while self.under_way > 0 {
             self.arrived.push(self.done.recv().ok()?);
             self.under_way -= 1;

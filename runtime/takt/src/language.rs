@@ -131,6 +131,12 @@ words! {
     NothingForced "nothing is forced" "没有强制变量",
     JournalFails "  the journal cannot be written" "  日志无法写入",
     NoJournal "A machine writes it while it runs in real time: `takt run PATH --speed real`, or with --state DIR." "机器以实时方式运行时写入:`takt run PATH --speed real`,或使用 --state DIR。",
+    Replayed "Replayed" "已重放",
+    RecordingCut "The recording was not ended: its run was cut off." "记录未正常结束:运行被中断。",
+    RecordingWritten "Recording" "输入记录",
+    RecordingIncomplete "is incomplete" "不完整",
+    CoreWritten "Core file (look at it with `takt core`)" "核心文件(用 `takt core` 查看)",
+    NoCore "no core file could be written" "无法写入核心文件",
     DefectOfTakt "This is a defect of Takt. Please report it with the program that shows it." "这是 Takt 的缺陷,请附上程序报告。",
 }
 

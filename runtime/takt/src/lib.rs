@@ -22,6 +22,7 @@ pub mod plot;
 pub mod program;
 pub mod project;
 pub mod realtime;
+pub mod recording;
 pub mod sources;
 pub mod spelling;
 pub mod state;

@@ -8,21 +8,24 @@ mod bus;
 mod error;
 mod limits;
 mod operator;
+mod taped;
 pub mod variable;
 
 pub use binding::{PlotPlaces, Shown, View};
 pub use bus::Bus;
 pub use error::{BuildError, End, VariableError};
+pub(crate) use taped::fault_json;
 
 use crate::host;
 use crate::manifest::{Located, ManifestError};
 use crate::program::{Compiled, Condition};
 use crate::project::Project;
+use crate::recording::host::Told;
 use crate::values;
 use operator::Operator;
 use std::sync::Arc;
-use takt_abi::Time;
-use takt_engine::{Clock, Command, CommandError, Engine, ExecutorKind, FaultRecord, LoadError};
+use takt_abi::{Host, Time};
+use takt_engine::{Clock, Command, CommandError, Engine, ExecutorKind, FaultRecord, IoDriver, LoadError};
 use takt_ir::{BodyId, Place, Program, Trigger};
 
 /// Bytes of native stack that the tool's thread keeps for compiled code.
@@ -42,6 +45,8 @@ pub struct Setup {
     pub alarm: bool,
     /// An ST condition that ends the run.
     pub until: Option<String>,
+    /// Where tasks are interrupted in virtual time (tests).
+    pub preempt: Vec<takt_engine::Preemption>,
     /// Bytes of native stack that the calling thread keeps for compiled code. `None`: what an ordinary thread has.
     pub native_stack: Option<usize>,
 }
@@ -69,11 +74,22 @@ pub struct Machine {
     /// Time of the first scan.
     started: Option<Time>,
     compiled: Compiled,
+    executor: ExecutorKind,
+    taped: taped::Taped,
 }
 
 impl Machine {
     /// Compiles and binds a project.
     pub fn new(project: &Project, setup: Setup) -> Result<Self, BuildError> {
+        Self::wrapped(project, setup, |driver, host| (driver, host))
+    }
+
+    /// The same with another bus and host in the place of, or around, its own.
+    pub fn wrapped(
+        project: &Project,
+        setup: Setup,
+        wrap: impl FnOnce(Box<dyn IoDriver>, Box<dyn Host>) -> (Box<dyn IoDriver>, Box<dyn Host>),
+    ) -> Result<Self, BuildError> {
         let mut conditions = Conditions::default();
         let simulation = project.manifest.simulation.as_ref();
         let done = conditions.add(simulation.and_then(|s| s.done.as_ref()));
@@ -90,20 +106,23 @@ impl Machine {
         let bound = binding::bind(project, &program, &bus.channels).map_err(BuildError::Manifest)?;
         let operator = Operator::new(bound.steps, waits.into_iter().map(watch).collect());
         let ordinary = takt_engine::Options::default();
+        let (driver, bus) = bus.split();
+        let (driver, host) = wrap(driver, Box::new(host::open(project.root.clone()).map_err(BuildError::Files)?));
+        let taped = taped::Taped::default();
         let options = takt_engine::Options {
             executor: setup.executor,
             native_stack: setup.native_stack.unwrap_or(ordinary.native_stack),
             bus_task: project.manifest.bus_task.as_ref().map(|task| task.value.clone()),
-            host: Box::new(host::open(project.root.clone()).map_err(BuildError::Files)?),
+            host: Box::new(Told::new(host, taped.stream.clone(), taped.calls.clone())),
             axes: bound.axes,
             wires: bound.wires,
             clock: setup.clock,
             stopwatch: setup.stopwatch,
+            preempt: setup.preempt,
             task_limits: limits::limits(&project.manifest, &program),
             alarm: setup.alarm.then(crate::clock::alarm).flatten(),
             ..ordinary
         };
-        let (driver, bus) = bus.split();
         let mut engine = takt_engine::load(program.clone(), options, driver).map_err(|error| load_error(project, error))?;
         compiled.conditions.iter().for_each(|body| engine.prepare(*body));
         let fastest = fastest_task(&program).unwrap_or(engine.bus_task());
@@ -120,6 +139,8 @@ impl Machine {
             view: bound.view,
             operator,
             compiled,
+            executor: setup.executor,
+            taped,
         })
     }
 
@@ -128,7 +149,9 @@ impl Machine {
         self.started.get_or_insert(now);
         self.operator.act(&mut self.engine, &mut self.bus, now);
         let before = self.cycles();
+        self.before_step();
         self.engine.step(now);
+        self.after_step();
         self.cycles() > before
     }
 

@@ -11,8 +11,10 @@ use crate::language::{self, Word};
 use crate::machine::{BuildError, End, Machine, Setup};
 use crate::project::{self, Project};
 use crate::realtime::{Held, system};
+use crate::recording::writer::Summary;
 use crate::sources::Sources;
 use crate::{messages, platform, state};
+use std::path::PathBuf;
 use takt_abi::Time;
 use takt_engine::{Clock, ExecutorKind};
 use takt_ir::Place;
@@ -51,6 +53,8 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         let entry = Entry::new(Event::Write).by("", "takt run --set", "");
         attached.post(entry.variable(variable).values(old, machine.literal(variable).ok()));
     }
+    let cores = state.as_ref().map(|state| state.path().join("cores"));
+    start_recording(args, &project, &mut machine, cores)?;
     let printed = places(&machine, &args.print, "--print")?;
     let stats = args.stats.as_deref().map(|path| summary::statistics_file(path).map_err(|error| usage(&error))).transpose()?;
     let outputs = Outputs::open(args, &machine)?;
@@ -77,6 +81,7 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     drop(held);
     let lost = writer.finish(&mut machine, args)?;
     teller.finish(&mut machine);
+    let recorded = machine.finish_recording();
     let thread = disturbances.map(|disturbances| summary::Thread { disturbances, lost });
     if let Some(format) = stats {
         format.write(&mut machine, thread.as_ref()).map_err(|error| usage(&error))?;
@@ -90,6 +95,7 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     if real && !args.json {
         summary::tell_tasks(&mut machine);
     }
+    tell_recording(args, recorded.as_ref());
     let bad = matches!(over, Over::End(End::Fault | End::TimedOut { .. } | End::Condition { .. }));
     Ok(if bad { Exit::Findings } else { Exit::Good })
 }
@@ -116,6 +122,7 @@ fn build(args: &RunArgs, project: &Project, speed: Speed) -> Result<Machine, Exi
         alarm: matches!(clock, Clock::Real(_)),
         stopwatch: Some(clock::nanoseconds),
         until: args.until.clone(),
+        preempt: Vec::new(),
         native_stack: Some(crate::machine::NATIVE_STACK),
     };
     let machine = Machine::new(project, setup).map_err(|error| refuse(&error))?;
@@ -123,7 +130,7 @@ fn build(args: &RunArgs, project: &Project, speed: Speed) -> Result<Machine, Exi
     Ok(machine)
 }
 
-fn refuse(error: &BuildError) -> Exit {
+pub(super) fn refuse(error: &BuildError) -> Exit {
     match error {
         BuildError::Program(compiled) => {
             check::tell(compiled);
@@ -141,6 +148,41 @@ fn refuse(error: &BuildError) -> Exit {
         }
         _ => usage(&error.to_string()),
     }
+}
+
+/// Records what was asked for, and in a state folder the last minutes for core files.
+fn start_recording(args: &RunArgs, project: &Project, machine: &mut Machine, cores: Option<PathBuf>) -> Result<(), Exit> {
+    if args.record_inputs.is_none() && cores.is_none() {
+        return Ok(());
+    }
+    let started = machine.record(project, args.record_inputs.clone(), cores);
+    started.map_err(|error| match &args.record_inputs {
+        Some(path) => usage(&format!("{} cannot be written: {error}", path.display())),
+        None => usage(&format!("the recorder cannot start: {error}")),
+    })
+}
+
+/// Says what became of recording and core files.
+fn tell_recording(args: &RunArgs, recorded: Option<&Summary>) {
+    let Some(summary) = recorded else { return };
+    let language = language::of_environment();
+    if let Some(path) = &args.record_inputs {
+        match &summary.incomplete {
+            None => console::tell(format_args!(
+                "{}: {} ({} KiB)",
+                Word::RecordingWritten.text(language),
+                path.display(),
+                summary.bytes.div_ceil(1024)
+            )),
+            Some(why) => {
+                console::tell(format_args!("{}: {} {}: {why}", warning(), path.display(), Word::RecordingIncomplete.text(language)))
+            }
+        }
+    }
+    for path in &summary.cores {
+        console::tell(format_args!("{}: {}", Word::CoreWritten.text(language), path.display()));
+    }
+    summary.failed.iter().for_each(|why| console::tell(format_args!("{}: {}: {why}", warning(), Word::NoCore.text(language))));
 }
 
 /// Says in one warning what the resource thread could not get, and how to grant it.
