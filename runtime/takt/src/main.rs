@@ -4,6 +4,9 @@ use clap::Parser;
 use std::process::ExitCode;
 use takt::commands::{self, Cli};
 
+#[global_allocator]
+static ALLOCATOR: takt::realtime::guard::Counting = takt::realtime::guard::Counting;
+
 /// The exit code of a defect of Takt.
 const DEFECT: u8 = 101;
 

@@ -11,6 +11,7 @@ pub mod system;
 #[path = "realtime/other.rs"]
 pub mod system;
 
+pub mod guard;
 pub mod samples;
 
 use crate::language::{self, Word};
@@ -107,12 +108,14 @@ impl Held {
         if settings.priority > 0 {
             need(Right::Priority, system::fifo(settings.priority));
         }
+        guard::watch(true);
         Self { missing, _awake: awake, settings }
     }
 }
 
 impl Drop for Held {
     fn drop(&mut self) {
+        guard::watch(false);
         if self.settings.priority > 0 {
             system::ordinary();
         }
@@ -133,6 +136,8 @@ pub struct Disturbances {
     pub waits: u64,
     /// Times that another thread took the processor.
     pub preempted: u64,
+    /// Requests to the allocator, while it was held.
+    pub allocations: u64,
 }
 
 impl Disturbances {
@@ -143,6 +148,7 @@ impl Disturbances {
             major_faults: self.major_faults - start.major_faults,
             waits: self.waits - start.waits,
             preempted: self.preempted - start.preempted,
+            allocations: self.allocations - start.allocations,
         }
     }
 }

@@ -75,10 +75,10 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         teller.scanned(machine);
         writer.scanned(machine);
     });
-    attached.post(Entry::new(Event::Stop).at(machine.now()).message(summary::ended(&over)));
-    let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
     let disturbances = held.as_ref().map(|_| system::disturbances().since(before));
     drop(held);
+    attached.post(Entry::new(Event::Stop).at(machine.now()).message(summary::ended(&over)));
+    let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
     let lost = writer.finish(&mut machine, args)?;
     teller.finish(&mut machine);
     let recorded = machine.finish_recording();

@@ -22,8 +22,8 @@ pub(super) struct Thread {
 
 impl Thread {
     fn to_json(&self) -> Value {
-        let Disturbances { minor_faults, major_faults, waits, preempted } = self.disturbances;
-        json!({ "minor_faults": minor_faults, "major_faults": major_faults, "waits": waits, "preempted": preempted, "samples_lost": self.lost })
+        let Disturbances { minor_faults, major_faults, waits, preempted, allocations } = self.disturbances;
+        json!({ "allocations": allocations, "minor_faults": minor_faults, "major_faults": major_faults, "waits": waits, "preempted": preempted, "samples_lost": self.lost })
     }
 }
 

@@ -143,6 +143,7 @@ pub fn disturbances() -> Disturbances {
         major_faults: usage.ru_majflt as u64,
         waits: usage.ru_nvcsw as u64,
         preempted: usage.ru_nivcsw as u64,
+        allocations: super::guard::requests(),
     }
 }
 
