@@ -34,8 +34,8 @@ END_RESOURCE END_CONFIGURATION"
         clock: Clock::Real(clock::machine_time),
         stopwatch: Some(clock::nanoseconds),
         alarm: true,
-        until: None,
         native_stack: Some(NATIVE_STACK),
+        ..Setup::default()
     };
     Machine::new(&project, setup).unwrap_or_else(|error| panic!("{error}"))
 }
