@@ -6,6 +6,8 @@ use crate::journal::{Entry, Event, Journal, Monitor};
 use crate::machine::Machine;
 use crate::project::Project;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// How long a machine that stands still sleeps between two looks.
@@ -19,6 +21,7 @@ pub struct Attached {
     monitor: Option<Monitor>,
     journal: Option<Journal>,
     faulted: bool,
+    forces: Arc<AtomicUsize>,
 }
 
 /// Where they are.
@@ -92,7 +95,13 @@ impl Attached {
         self.look(machine);
     }
 
+    /// How many variables are forced, for the live line.
+    pub fn force_count(&self) -> Arc<AtomicUsize> {
+        self.forces.clone()
+    }
+
     fn look(&mut self, machine: &mut Machine) {
+        self.forces.store(machine.forces(), Ordering::Relaxed);
         if let Some(port) = &mut self.port {
             port.serve(machine.engine());
         }

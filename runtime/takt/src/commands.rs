@@ -1,5 +1,6 @@
 //! The command line (DESIGN §9): one file per command.
 
+mod backup;
 mod check;
 mod ctl;
 mod doctor;
@@ -55,6 +56,10 @@ enum Command {
     Doctor(DoctorArgs),
     /// Lets a project start with the computer, as a systemd service.
     Service(ServiceArgs),
+    /// Saves a project with what its machine keeps between runs.
+    Backup(BackupArgs),
+    /// Brings a backup back.
+    Restore(RestoreArgs),
     /// Explains a code like E0301.
     Explain(ExplainArgs),
 }
@@ -184,6 +189,41 @@ struct Where {
     /// The state folder, if the run has one of its own.
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+struct BackupArgs {
+    /// The project's folder.
+    #[arg(value_name = "PATH")]
+    path: PathBuf,
+    /// The state folder, if the run has one of its own.
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
+    /// The file: .tar.gz.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Writes over a file that is there.
+    #[arg(long)]
+    force: bool,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Args)]
+struct RestoreArgs {
+    /// The file: .tar.gz.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// The folder: a new or empty one.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Writes over what is there.
+    #[arg(long)]
+    force: bool,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -325,6 +365,8 @@ pub fn execute(cli: Cli) -> Exit {
         Command::Log(args) => log::execute(&args),
         Command::Doctor(args) => doctor::execute(&args),
         Command::Service(args) => service::execute(&args),
+        Command::Backup(args) => backup::save(&args),
+        Command::Restore(args) => backup::restore(&args),
         Command::Explain(args) => explain::execute(args.code.as_deref()),
     }
 }

@@ -4,6 +4,7 @@
 //! [`project::load`] reads a project, [`machine::Machine::new`] makes it run.
 
 pub mod attached;
+pub mod backup;
 pub mod clock;
 pub mod commands;
 pub mod console;
@@ -16,6 +17,7 @@ pub mod language;
 pub mod machine;
 pub mod manifest;
 pub mod messages;
+pub mod parameters;
 pub mod places;
 pub mod platform;
 pub mod plot;

@@ -236,6 +236,11 @@ impl Machine {
         self.engine.statistics(self.fastest)
     }
 
+    /// How many variables are forced.
+    pub fn forces(&self) -> usize {
+        self.engine.force_count()
+    }
+
     /// The fault that stopped the program.
     pub fn fault(&self) -> Option<&FaultRecord> {
         self.engine.fault()

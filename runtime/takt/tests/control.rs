@@ -20,6 +20,8 @@ VAR_GLOBAL
   Many : ARRAY[0..999] OF LREAL;
 END_VAR
 VAR_GLOBAL CONSTANT Limit : INT := 7; END_VAR
+TYPE RECIPE : STRUCT Speed : LREAL := 2.5; END_STRUCT END_TYPE
+VAR_GLOBAL PERSISTENT Recipe : RECIPE; END_VAR
 PROGRAM PLC_PRG
 VAR n : DINT; z : INT; END_VAR
 n := n + 1;
@@ -194,7 +196,7 @@ fn the_page_is_true() {
         let keys = |value: &Value| value.as_object().map(|object| object.keys().cloned().collect::<Vec<_>>());
         assert_eq!((&answer["id"], keys(&answer)), (&pair[1]["id"], keys(&pair[1])), "{} gave {answer}", pair[0]);
         assert_eq!(keys(&answer["result"]), keys(&pair[1]["result"]), "{} gave {answer}", pair[0]);
-        for same in ["error", "values", "done", "forces", "before", "held", "released"] {
+        for same in ["error", "values", "parameters", "done", "forces", "before", "held", "released"] {
             let part = |value: &Value| if same == "error" { value[same].clone() } else { value["result"][same].clone() };
             assert_eq!(part(&answer), part(&pair[1]), "{} gave {answer}", pair[0]);
         }
@@ -348,9 +350,9 @@ fn a_machine_that_faulted_waits_for_a_reset_and_one_that_is_paused_stands_still(
         client.good(json!({ "request": "write", "variables": [{ "variable": "Crash", "value": true }] }));
         machine.wait("the fault", || client.good(json!({ "request": "status" }))["state"] == "faulted");
         let fault = client.good(json!({ "request": "status" }))["fault"].clone();
-        assert!(fault["code"] == "division-by-zero" && fault["line"] == 18, "{fault}");
+        assert!(fault["code"] == "division-by-zero" && fault["line"] == 20, "{fault}");
         let (code, out, _) = machine.takt(&["ctl", "status"]);
-        assert!(code == 1 && out.contains("GVL.st:18"), "{out}");
+        assert!(code == 1 && out.contains("GVL.st:20"), "{out}");
         client.good(json!({ "request": "reset" }));
         assert_eq!(client.good(json!({ "request": "status" }))["state"], "running");
     }

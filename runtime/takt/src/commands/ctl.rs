@@ -187,8 +187,8 @@ pub(super) fn connect(machine: &Where, socket: Option<&PathBuf>) -> Result<Clien
     Client::connect(&path).map_err(|error| refuse(&error))
 }
 
-/// Arms a connection, or says what is missing.
-pub(super) fn arm(client: &mut Client, name: Option<&String>, reason: Option<&String>) -> Result<(), Exit> {
+/// Who changes something and why, or what is missing.
+pub(super) fn who(name: Option<&String>, reason: Option<&String>) -> Result<(String, String), Exit> {
     let from = |given: Option<&String>, variables: &[&str]| {
         let set = |name: &&str| std::env::var(name).ok().filter(|value| !value.trim().is_empty());
         given.cloned().or_else(|| variables.iter().find_map(set))
@@ -198,7 +198,12 @@ pub(super) fn arm(client: &mut Client, name: Option<&String>, reason: Option<&St
         console::tell(format_args!("{}: {}", Word::Error.text(language), Word::ReasonNeeded.text(language)));
         return Err(Exit::Usage);
     };
-    let name = from(name, &["TAKT_AS", "USER", "LOGNAME"]).unwrap_or_else(|| "unknown".into());
+    Ok((from(name, &["TAKT_AS", "USER", "LOGNAME"]).unwrap_or_else(|| "unknown".into()), reason))
+}
+
+/// Arms a connection.
+pub(super) fn arm(client: &mut Client, name: Option<&String>, reason: Option<&String>) -> Result<(), Exit> {
+    let (name, reason) = who(name, reason)?;
     client.ask("arm", json!({ "name": name, "reason": reason })).map_err(|error| refuse(&error)).map(|_| ())
 }
 

@@ -1,10 +1,13 @@
 //! The live line: what the manifest wants shown, on one line of the terminal, ten times a second.
 
 use crate::clock;
+use crate::language::{self, Word};
 use crate::machine::Shown;
 use crate::realtime::samples::Look;
 use crate::values;
 use std::io::{IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Nanoseconds between two lines.
 const PERIOD: u64 = 100_000_000;
@@ -16,11 +19,24 @@ pub(super) struct Live {
     next: u64,
     shown: bool,
     looks: u32,
+    forces: Arc<AtomicUsize>,
 }
 
 impl Live {
     pub(super) fn new(wanted: bool, items: &[Shown]) -> Self {
-        Self { items: items.to_vec(), on: wanted && std::io::stderr().is_terminal(), next: 0, shown: false, looks: 0 }
+        Self {
+            items: items.to_vec(),
+            on: wanted && std::io::stderr().is_terminal(),
+            next: 0,
+            shown: false,
+            looks: 0,
+            forces: Arc::default(),
+        }
+    }
+
+    /// Where it finds how many variables are forced.
+    pub(super) fn show_forces(&mut self, forces: Arc<AtomicUsize>) {
+        self.forces = forces;
     }
 
     /// Whether there is a terminal.
@@ -47,9 +63,13 @@ impl Live {
         self.shown = true;
         let colour = anstream::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let (dim, plain) = if colour { ("\x1b[2m", "\x1b[0m") } else { ("", "") };
+        let forces = match self.forces.load(Ordering::Relaxed) {
+            0 => String::new(),
+            count => format!("[{count} {}] ", Word::Forced.text(language::of_environment())),
+        };
+        let text = format!("{forces}{}", line(&self.items, machine, width().saturating_sub(forces.chars().count())));
         // A terminal that cannot be written to is no reason to stop a machine.
-        let _ =
-            write!(std::io::stderr(), "\r\x1b[K{dim}{:>9.3} s{plain}  {}", machine.time().seconds(), line(&self.items, machine, width()));
+        let _ = write!(std::io::stderr(), "\r\x1b[K{dim}{:>9.3} s{plain}  {text}", machine.time().seconds());
         let _ = std::io::stderr().flush();
     }
 

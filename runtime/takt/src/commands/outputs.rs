@@ -47,6 +47,11 @@ impl Outputs {
         Ok(Self { trace, plot, live: Live::new(!args.json, &machine.view().live), failed: None })
     }
 
+    /// Where the live line finds how many variables are forced.
+    pub(super) fn show_forces(&mut self, forces: std::sync::Arc<std::sync::atomic::AtomicUsize>) {
+        self.live.show_forces(forces);
+    }
+
     /// The variables that are looked at.
     fn places(&self) -> Vec<Place> {
         let trace = self.trace.iter().flat_map(|(_, places)| places.iter().copied());

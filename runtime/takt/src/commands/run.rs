@@ -57,7 +57,8 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     start_recording(args, &project, &mut machine, cores)?;
     let printed = places(&machine, &args.print, "--print")?;
     let stats = args.stats.as_deref().map(|path| summary::statistics_file(path).map_err(|error| usage(&error))).transpose()?;
-    let outputs = Outputs::open(args, &machine)?;
+    let mut outputs = Outputs::open(args, &machine)?;
+    outputs.show_forces(attached.force_count());
     let mut writer = Writer::start(outputs, &mut machine, real)?;
     let mut teller = Teller::start(real)?;
     platform::listen_for_stop();

@@ -74,7 +74,7 @@ pub(super) fn to_json(machine: &mut Machine, printed: &[(String, Place)], thread
     let types = &machine.program().types;
     let values: serde_json::Map<String, Value> =
         printed.iter().map(|(name, place)| (name.clone(), values::to_json(types, place.ty, machine.bytes(*place)))).collect();
-    json!({
+    let mut object = json!({
         "schema": 1,
         "cycles": machine.cycles(),
         "time_ns": machine.elapsed().0,
@@ -83,7 +83,11 @@ pub(super) fn to_json(machine: &mut Machine, printed: &[(String, Place)], thread
         "values": values,
         "tasks": tasks,
         "thread": thread.map(Thread::to_json),
-    })
+    });
+    if machine.forces() > 0 {
+        object["forces"] = machine.forces().into();
+    }
+    object
 }
 
 fn fault(record: &FaultRecord) -> Value {
@@ -142,6 +146,9 @@ fn rows(machine: &Machine, over: &Over, wall: f64, language: Language) -> Vec<(S
     let statistics = machine.statistics();
     let times = &statistics.scan_ns;
     row(Word::Cycles, machine.cycles().to_string());
+    if machine.forces() > 0 {
+        row(Word::ForcedVariables, machine.forces().to_string());
+    }
     let factor = machine.elapsed().seconds() / wall.max(1e-9);
     row(Word::MachineTime, format!("{:.3} s ({factor:.1} {})", machine.elapsed().seconds(), Word::RealTimeFactor.text(language)));
     if times.count() > 0 {

@@ -9,6 +9,7 @@ use super::session::{Armed, Rhythm, Subscription};
 use super::{NAME, VERSION, limits};
 use crate::journal::{Entry, Event, clean};
 use crate::machine::variable;
+use crate::parameters;
 use serde_json::{Value, json};
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -58,6 +59,7 @@ impl Server {
             Request::Status {} => self.ask_status(client, id, Kind::Status),
             Request::Tasks {} => self.ask_status(client, id, Kind::Tasks),
             Request::Forces {} => self.ask_status(client, id, Kind::Forces),
+            Request::Parameters {} => self.parameters(client, id),
             Request::Read { variables } => {
                 let (names, spans) = self.copied(&variables)?;
                 let bytes = vec![0; job::length(&spans)];
@@ -188,6 +190,20 @@ impl Server {
             );
         }
         Ok((names.into(), spans.into()))
+    }
+
+    /// The PERSISTENT variables.
+    fn parameters(&mut self, client: u64, id: &Value) -> Result<(), Problem> {
+        let list = parameters::list(&self.about.program).map_err(|message| Problem::new("too-large", message))?;
+        let names: Vec<String> = list.into_iter().map(|parameter| parameter.path).collect();
+        if names.is_empty() {
+            self.send(Some(client), &good(id, json!({ "parameters": [] })));
+            return Ok(());
+        }
+        let (names, spans) = self.copied(&names)?;
+        let bytes = vec![0; job::length(&spans)];
+        self.demand(client, id, Work::Read { spans, bytes }, Kind::Parameters(names.to_vec()));
+        Ok(())
     }
 
     fn lease(lease_ms: Option<u64>) -> Result<Option<Duration>, Problem> {
@@ -351,6 +367,17 @@ impl Server {
             (Kind::Read(names), Work::Read { bytes, .. }) => {
                 let values = answer::values(&self.about.program, &names, &bytes);
                 self.send(client, &good(&id, stamp(json!({ "values": values }))));
+            }
+            (Kind::Parameters(names), Work::Read { bytes, .. }) => {
+                let mut rest = &bytes[..];
+                let list = names.iter().map_while(|named| {
+                    let (own, behind) = rest.split_at_checked(named.len)?;
+                    rest = behind;
+                    let literal = self.text(named.ty, own);
+                    Some(json!({ "variable": named.name, "type": self.about.program.types.name(named.ty), "literal": literal }))
+                });
+                let list: Vec<Value> = list.collect();
+                self.send(client, &good(&id, stamp(json!({ "parameters": list }))));
             }
             (Kind::Status, Work::Status(status)) => {
                 let value = self.status(&status);

@@ -50,6 +50,7 @@ pub(super) enum Request {
     Status {},
     Tasks {},
     Forces {},
+    Parameters {},
     Read {
         variables: Vec<String>,
     },

@@ -44,6 +44,7 @@ pub(super) struct Target {
 #[derive(Debug)]
 pub(super) enum Kind {
     Read(Vec<Named>),
+    Parameters(Vec<Named>),
     Status,
     Tasks,
     Forces,
