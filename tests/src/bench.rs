@@ -4,7 +4,7 @@ use crate::case::{Case, Expected, Waveform, expectations, waveform};
 use std::sync::Arc;
 use takt_abi::Time;
 use takt_compile::{Input, Options as Choices, Output};
-use takt_engine::{Engine, ExecutorKind, NoBus, Options, Reset};
+use takt_engine::{Engine, ExecutorKind, NoBus, Options, Preemption, Reset};
 use takt_ir::{Place, Program};
 use takt_syntax::Source;
 
@@ -104,7 +104,9 @@ pub fn load(program: &Arc<Program>, executor: ExecutorKind) -> Result<Engine, St
 }
 
 fn play(program: &Arc<Program>, wave: &Waveform, executor: ExecutorKind) -> Result<Engine, String> {
-    let mut engine = load(program, executor)?;
+    let preempt = wave.preempt.iter().map(|(task, at_fuel, cycle)| Preemption { cycle: *cycle, task: *task, at_fuel: *at_fuel });
+    let options = Options { executor, fuel_limit: 1_000_000, preempt: preempt.collect(), ..Options::default() };
+    let mut engine = takt_engine::load(program.clone(), options, Box::new(NoBus)).map_err(|e| e.to_string())?;
     let scans = wave.rows.iter().map(|r| r.values.len()).max().unwrap_or(1);
     for scan in 0..scans {
         for (_, kind) in wave.resets.iter().filter(|(before, _)| *before == scan + 1) {

@@ -3,6 +3,7 @@
 //! `--- name check ---`: every line `// ^ CODE text` says that the line above it has a message with that code at the caret's column, whose text,
 //! with the help in brackets behind it, contains `text` (`// <- CODE text`: at column 1); there must be no other message. `--- name lint ---` is the same with warnings of likely mistakes. `--- name run ---`: lines `//|` are a waveform, one column per scan: `X = 1 2` drives, `X : 1 2`
 //! expects (`_` does not), `every 10ms` is the step, `fault NAME at LINE:COL` expects the run to end so, `stack BODY:LINE …` its callers.
+//! `preempt 1 at 17 in 2` interrupts the second scan of task 1 (in declared order, from 0) where it has used 17 units of fuel;
 //! `reset warm before 3` restarts the program before the third scan (warm, cold, origin).
 //! `--- name ir ---`: a program in the text form of the IR, for what ST cannot reach; the waveform stands behind `;|`, and `refused TEXT` says that the
 //! verifier must not let it pass.
@@ -91,6 +92,8 @@ pub struct Waveform {
     pub fault: Option<String>,
     /// `main:7 outer:3`.
     pub stack: Option<String>,
+    /// Preemptions: task, fuel, scan of the task.
+    pub preempt: Vec<(usize, u64, u64)>,
     /// Restarts: `reset warm before 3` is (3, "warm").
     pub resets: Vec<(usize, String)>,
     /// Part of the verifier's message.
@@ -109,6 +112,10 @@ pub fn waveform(source: &str) -> Result<Waveform, String> {
             wave.fault = Some(fault.trim().into());
         } else if let Some(reason) = line.strip_prefix("refused ") {
             wave.refused = Some(reason.trim().into());
+        } else if let Some(rest) = line.strip_prefix("preempt ") {
+            let numbers: Vec<u64> = rest.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+            let [task, fuel, cycle] = numbers[..] else { return Err(format!("`{line}` is not of the form `preempt 1 at 17 in 2`")) };
+            wave.preempt.push((task as usize, fuel, cycle));
         } else if let Some(reset) = line.strip_prefix("reset ") {
             let (kind, scan) = reset.split_once(" before ").ok_or(format!("`{line}` is not of the form `reset warm before 3`"))?;
             wave.resets.push((scan.trim().parse().map_err(|_| format!("`{scan}` is no number of a scan"))?, kind.trim().into()));

@@ -8,6 +8,7 @@ use crate::bus::{IoDriver, IoFault, ProcessImage};
 use crate::executor::Executor;
 use crate::fault::{FaultRecord, RawFault};
 use crate::force::Forces;
+use crate::latch::Latches;
 use crate::limits::Alarm;
 use crate::load::Link;
 use crate::mapping::Mapping;
@@ -53,6 +54,8 @@ pub(crate) struct Core {
     pub io_fault: Option<IoFault>,
     pub io_faults: u64,
     pub forces: Forces,
+    /// What tasks see of variables that others write.
+    pub latches: Latches,
     /// Takes snapshots of the retained variables.
     pub keeper: Option<Keeper>,
     pub fuel_limit: u64,
@@ -167,6 +170,7 @@ impl Core {
     /// One scan of a task, with the bus cycle around it if the task owns the bus.
     fn release(&mut self, index: usize, now: Time) {
         let outer = self.enter(index, now);
+        self.latches.enter(index, self.image.bytes_mut());
         if index == self.bus {
             self.bus_inputs();
         }
@@ -188,6 +192,7 @@ impl Core {
         if index == self.bus {
             self.bus_outputs(now);
         }
+        self.latches.leave(self.image.bytes_mut());
         self.leave(index, outer);
         self.observe(index, now);
     }

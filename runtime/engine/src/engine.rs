@@ -129,6 +129,9 @@ impl Engine {
     pub fn halt(&mut self) {
         self.tell(&Command::Halt);
         let core = &mut self.core;
+        if let (None, None, Some(keeper)) = (&core.fault, core.current, &mut core.keeper) {
+            keeper.halt(core.image.bytes());
+        }
         let cycle = core.tasks[core.bus].statistics.cycles;
         core.stop_application(RawFault::outside(Fault::Stopped, core.bus, core.now, cycle));
     }
@@ -163,6 +166,9 @@ impl Engine {
         let kept = Restore::of_image(&core.program, kind, core.image.bytes());
         core.initialise(Some(&kept))?;
         core.fault = None;
+        if let Some(keeper) = &mut core.keeper {
+            keeper.start();
+        }
         core.stop.store(false, Ordering::Relaxed);
         let release = core.tasks[core.bus].release;
         for task in &mut core.tasks {
@@ -175,6 +181,12 @@ impl Engine {
     /// Where snapshots of the retained variables come out, if [`crate::Options::retain_interval`] asks for them; can be taken once.
     pub fn snapshots(&mut self) -> Option<SnapshotReader> {
         self.core.keeper.as_mut()?.reader()
+    }
+
+    /// The last whole state of the retained variables: as they are now, between steps, or as they were when the program was halted. `None` after a fault,
+    /// which leaves them half changed, and without [`crate::Options::retain_interval`].
+    pub fn last_retained(&self) -> Option<Vec<u8>> {
+        self.core.keeper.as_ref()?.last(self.image(), self.core.fault.is_some())
     }
 
     /// The retained variables as they are now, between steps; see [`RetainLayout`]. After a fault they may be half changed.

@@ -20,6 +20,7 @@ mod engine;
 mod executor;
 mod fault;
 mod force;
+mod latch;
 mod limits;
 mod load;
 mod mapping;

@@ -7,6 +7,7 @@ use crate::core::Core;
 use crate::engine::Engine;
 use crate::executor::Executor;
 use crate::fault::FaultRecord;
+use crate::latch::Latches;
 use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::memory::{Image, Lane, Pinned};
@@ -173,6 +174,8 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     if let Some(part) = options.restore.as_ref().and_then(|restore| restore.defect(&program)) {
         return Err(LoadError::Restore { part });
     }
+    let axes: Vec<u32> = options.axes.iter().map(|axis| axis.place.offset).collect();
+    let latches = Latches::new(&program, bus, |start, len| written_by_bus(&program, &axes, &links, start, len));
     let keeper = options.retain_interval.filter(|_| !program.retained.is_empty()).map(|interval| Keeper::new(&program, interval));
     let mut preempt = options.preempt;
     preempt.sort_by_key(|p| (p.task, p.cycle, p.at_fuel));
@@ -193,6 +196,7 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
         io_fault: None,
         io_faults: 0,
         forces: crate::force::Forces::default(),
+        latches,
         keeper,
         depth_limit: options.depth_limit,
         fuel_limit: options.fuel_limit.min(i64::MAX as u64 / 2),
@@ -221,6 +225,16 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     }
     core.initialise(options.restore.as_ref()).map_err(LoadError::Initial)?;
     Ok(Engine::new(core))
+}
+
+/// Whether the bus writes into a stretch of the image: inputs, axes, variables with addresses from VAR_CONFIG.
+fn written_by_bus(program: &Program, axes: &[u32], links: &[Link], start: u32, len: u32) -> bool {
+    let meets = |offset: u32, bytes: u32| {
+        u64::from(offset) < u64::from(start) + u64::from(len) && u64::from(start) < u64::from(offset) + u64::from(bytes)
+    };
+    axes.iter().any(|offset| meets(*offset, size_of::<takt_abi::AxisRef>() as u32))
+        || links.iter().any(|link| link.channel.is_input() && meets(link.offset as u32, 8))
+        || program.mapped.iter().any(|mapped| meets(mapped.offset, program.types.size(mapped.ty)))
 }
 
 fn bus_task(program: &Program, name: Option<&str>) -> Result<usize, LoadError> {

@@ -211,6 +211,9 @@ pub(crate) struct Keeper {
     full: Producer<Box<Snapshot>>,
     empty: Consumer<Box<Snapshot>>,
     reader: Option<SnapshotReader>,
+    /// The state at which the program was halted, once it was.
+    last: Vec<u8>,
+    halted: bool,
 }
 
 impl Keeper {
@@ -221,7 +224,8 @@ impl Keeper {
             let _ = back.push(Box::new(Snapshot { time: Time(0), number: 0, bytes: vec![0; layout.len()] }));
         }
         let reader = Some(SnapshotReader { full: taken, empty: back });
-        Self { layout, interval, due: None, number: 0, full, empty, reader }
+        let last = vec![0; layout.len()];
+        Self { layout, interval, due: None, number: 0, full, empty, reader, last, halted: false }
     }
     pub fn reader(&mut self) -> Option<SnapshotReader> {
         self.reader.take()
@@ -234,6 +238,23 @@ impl Keeper {
         if self.take(now, image) {
             self.due = Some(Time(now.0.saturating_add(self.interval.0)));
         }
+    }
+    /// The program is halted between two steps.
+    pub fn halt(&mut self, image: &[u8]) {
+        self.layout.copy(image, &mut self.last);
+        self.halted = true;
+    }
+    /// It starts again.
+    pub fn start(&mut self) {
+        (self.halted, self.due) = (false, None);
+    }
+    /// The state at the end of a run: as it is now, or as it was when the program was halted. `None` after a fault in the middle of a scan.
+    pub fn last(&self, image: &[u8], faulted: bool) -> Option<Vec<u8>> {
+        let mut bytes = self.last.clone();
+        if !self.halted && !faulted {
+            self.layout.copy(image, &mut bytes);
+        }
+        (self.halted || !faulted).then_some(bytes)
     }
     fn take(&mut self, now: Time, image: &[u8]) -> bool {
         let Ok(mut snapshot) = self.empty.pop() else { return false };

@@ -6,10 +6,12 @@ mod ctl;
 mod doctor;
 mod explain;
 mod import;
+mod keep;
 mod live;
 mod log;
 mod outputs;
 mod replay;
+mod retain;
 mod run;
 mod said;
 mod service;
@@ -60,6 +62,11 @@ enum Command {
     Backup(BackupArgs),
     /// Brings a backup back.
     Restore(RestoreArgs),
+    /// Shows, exports or imports the retained values of a machine that is not running.
+    Retain {
+        #[command(subcommand)]
+        command: RetainCommand,
+    },
     /// Explains a code like E0301.
     Explain(ExplainArgs),
 }
@@ -103,6 +110,12 @@ pub struct RunArgs {
     /// Serves `takt ctl` at this socket. Default: in the state folder, in real time only.
     #[arg(long, value_name = "SOCKET")]
     pub control: Option<PathBuf>,
+    /// Starts RETAIN variables with their initial values; PERSISTENT ones keep theirs.
+    #[arg(long, conflicts_with = "origin")]
+    pub cold: bool,
+    /// Starts all variables with their initial values.
+    #[arg(long)]
+    pub origin: bool,
     /// Writes the statistics of the tasks at the end.
     #[arg(long, value_name = "FILE.json|csv")]
     pub stats: Option<PathBuf>,
@@ -178,6 +191,29 @@ struct ImportArgs {
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+enum RetainCommand {
+    /// Shows the stored values.
+    Show(RetainArgs),
+    /// Writes the stored values as JSON to a file, or to standard output.
+    Export(RetainArgs),
+    /// Stores the values of such a file for the next start: all of them, or none if one does not fit.
+    Import(RetainArgs),
+}
+
+#[derive(Debug, Clone, Args)]
+struct RetainArgs {
+    /// A project folder (with takt.toml) or a source file.
+    #[arg(value_name = "PATH")]
+    path: PathBuf,
+    /// The file with the values.
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+    /// Where the machine keeps its state. Default: .takt in the project's folder.
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
 }
 
 /// Which machine is meant.
@@ -367,6 +403,7 @@ pub fn execute(cli: Cli) -> Exit {
         Command::Service(args) => service::execute(&args),
         Command::Backup(args) => backup::save(&args),
         Command::Restore(args) => backup::restore(&args),
+        Command::Retain { command } => retain::execute(&command),
         Command::Explain(args) => explain::execute(args.code.as_deref()),
     }
 }

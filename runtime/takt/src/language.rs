@@ -144,6 +144,15 @@ words! {
     RecordingIncomplete "is incomplete" "不完整",
     CoreWritten "Core file (look at it with `takt core`)" "核心文件(用 `takt core` 查看)",
     NoCore "no core file could be written" "无法写入核心文件",
+    RetainTorn "The last write of the retained values was cut off; the generation before it is used" "保持数据的最后一次写入被中断,使用上一代数据",
+    RetainAdded "Retained variables without a stored value start with their initial values" "以下保持变量没有存储值,以初始值启动",
+    RetainRemoved "Values that the program no longer retains were put aside in" "程序不再保持的值已另存到",
+    RetainDropped "Parts of retained variables that are gone were put aside in" "保持变量中已删除的部分已另存到",
+    RetainConverted "Retained values were converted to their new types" "以下保持值已转换为新类型",
+    RetainFailed "The retained values cannot be written; Takt goes on trying" "无法写入保持数据,将继续尝试",
+    RetainNone "no retained values" "没有保持数据",
+    RetainImported "values imported" "个值已导入",
+    RetainInitial "not in the file, with their initial values" "文件中没有,使用初始值",
     DefectOfTakt "This is a defect of Takt. Please report it with the program that shows it." "这是 Takt 的缺陷,请附上程序报告。",
 }
 

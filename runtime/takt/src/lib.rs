@@ -25,6 +25,7 @@ pub mod program;
 pub mod project;
 pub mod realtime;
 pub mod recording;
+pub mod retain;
 pub mod sources;
 pub mod spelling;
 pub mod state;

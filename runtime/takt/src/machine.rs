@@ -21,7 +21,7 @@ use crate::manifest::{Located, ManifestError};
 use crate::program::{Compiled, Condition};
 use crate::project::Project;
 use crate::recording::host::Told;
-use crate::values;
+use crate::{retain, values};
 use operator::Operator;
 use std::sync::Arc;
 use takt_abi::{Host, Time};
@@ -43,6 +43,8 @@ pub struct Setup {
     /// The calling thread is woken within a scan when a higher task is due or a watchdog strikes, under [`crate::clock::machine_time`]. Without it
     /// scans look at the clock now and then.
     pub alarm: bool,
+    /// Retained values to start from; with it, snapshots of them come out of the engine.
+    pub retained: Option<retain::Source>,
     /// An ST condition that ends the run.
     pub until: Option<String>,
     /// Where tasks are interrupted in virtual time (tests).
@@ -76,6 +78,8 @@ pub struct Machine {
     compiled: Compiled,
     executor: ExecutorKind,
     taped: taped::Taped,
+    /// What came of the retained values.
+    migration: Option<retain::Migration>,
 }
 
 impl Machine {
@@ -105,6 +109,12 @@ impl Machine {
             .map_err(|error| BuildError::Manifest(project.errors(vec![error])))?;
         let bound = binding::bind(project, &program, &bus.channels).map_err(BuildError::Manifest)?;
         let operator = Operator::new(bound.steps, waits.into_iter().map(watch).collect());
+        let migration = setup.retained.as_ref().and_then(|source| retain::migrate::migrate(&program, source));
+        let lenient = setup.retained.as_ref().is_some_and(|source| source.lenient);
+        if let Some(migration) = migration.as_ref().filter(|m| !m.refused.is_empty() && !lenient) {
+            return Err(BuildError::Retain(migration.refused.clone()));
+        }
+        let interval = project.manifest.retain_interval.unwrap_or(retain::INTERVAL);
         let ordinary = takt_engine::Options::default();
         let (driver, bus) = bus.split();
         let (driver, host) = wrap(driver, Box::new(host::open(project.root.clone()).map_err(BuildError::Files)?));
@@ -116,6 +126,8 @@ impl Machine {
             host: Box::new(Told::new(host, taped.stream.clone(), taped.calls.clone())),
             axes: bound.axes,
             wires: bound.wires,
+            restore: migration.as_ref().map(|migration| migration.restore.clone()),
+            retain_interval: setup.retained.is_some().then_some(interval),
             clock: setup.clock,
             stopwatch: setup.stopwatch,
             preempt: setup.preempt,
@@ -141,6 +153,7 @@ impl Machine {
             compiled,
             executor: setup.executor,
             taped,
+            migration,
         })
     }
 
@@ -254,6 +267,11 @@ impl Machine {
     /// The engine.
     pub fn engine(&mut self) -> &mut Engine {
         &mut self.engine
+    }
+
+    /// What came of the retained values that were there.
+    pub fn migration(&self) -> Option<&retain::Migration> {
+        self.migration.as_ref()
     }
 
     /// The simulated bus: inputs, drives that fail, switches that stick.

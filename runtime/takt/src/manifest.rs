@@ -97,6 +97,8 @@ pub struct Manifest {
     pub live: Vec<Item>,
     /// The table at the end.
     pub report: Vec<Item>,
+    /// How often retained variables are written, if given.
+    pub retain_interval: Option<takt_abi::Time>,
     /// What a plot draws.
     pub plot: Option<Plot>,
 }
@@ -139,6 +141,7 @@ fn sections(root: &mut Table<'_, '_>, manifest: &mut Manifest) {
     root.section("live", |table| manifest.live = view::read_items(table, "items"));
     root.section("report", |table| manifest.report = view::read_items(table, "lines"));
     root.section("plot", |table| manifest.plot = Some(view::read_plot(table)));
+    root.section("retain", |table| manifest.retain_interval = retain(table));
     root.finish();
 }
 
@@ -149,6 +152,18 @@ fn project(table: &mut Table<'_, '_>, manifest: &mut Manifest) {
     manifest.addressing = table.choice("addressing", &[("word", Addressing::Word), ("byte", Addressing::Byte)]);
     manifest.strict = table.boolean("strict").unwrap_or(false);
     manifest.heap = table.number("heap", 16.0..=1073741824.0).map_or(0, |bytes| bytes as u32);
+}
+
+/// How often retained variables are written.
+fn retain(table: &mut Table<'_, '_>) -> Option<takt_abi::Time> {
+    let place = table.span();
+    let interval = table.duration("interval")?;
+    let (least, most) = (takt_abi::Time::from_millis(1), takt_abi::Time::from_millis(3_600_000));
+    if !(least..=most).contains(&interval) {
+        table.error(place, "`interval` in [retain] must be from 1ms to 1h", "the default is \"100ms\": what a power cut can lose");
+        return None;
+    }
+    Some(interval)
 }
 
 fn defines(table: &mut Table<'_, '_>, defines: &mut Vec<(String, String)>) {

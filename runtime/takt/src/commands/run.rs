@@ -1,5 +1,6 @@
 //! `takt run`: runs a program until it is over.
 
+use super::keep::{self, Keep};
 use super::outputs::{Outputs, Writer, warning};
 use super::said::Teller;
 use super::{EngineKind, Exit, Format, RunArgs, Speed, check, summary};
@@ -42,10 +43,10 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     let project = project::load_all(&args.paths).map_err(|error| check::refuse(&error, Format::Text))?;
     tell_encodings(&project.sources);
     let speed = speed(args, &project);
-    let mut machine = build(args, &project, speed)?;
     let real = speed == Speed::Factor(1.0);
-    let state = state::of_run(&project, args.state.as_deref(), real).map_err(|error| usage(&error.to_string()))?;
-    let places_of_it = Places::of(state.as_ref().map(state::State::path), args.control.as_deref());
+    let keep = Keep::open(args, &project, real)?;
+    let mut machine = build(args, &project, speed, &keep)?;
+    let places_of_it = Places::of(keep.state().map(state::State::path), args.control.as_deref());
     let mut attached = Attached::open(&places_of_it, &project, &mut machine, real).map_err(|error| usage(&error))?;
     for (variable, value) in &args.set {
         let old = machine.literal(variable).ok();
@@ -53,12 +54,13 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         let entry = Entry::new(Event::Write).by("", "takt run --set", "");
         attached.post(entry.variable(variable).values(old, machine.literal(variable).ok()));
     }
-    let cores = state.as_ref().map(|state| state.path().join("cores"));
+    let cores = keep.state().map(|state| state.path().join("cores"));
     start_recording(args, &project, &mut machine, cores)?;
     let printed = places(&machine, &args.print, "--print")?;
     let stats = args.stats.as_deref().map(|path| summary::statistics_file(path).map_err(|error| usage(&error))).transpose()?;
     let mut outputs = Outputs::open(args, &machine)?;
     outputs.show_forces(attached.force_count());
+    let keeping = keep.start(&project, &mut machine)?;
     let mut writer = Writer::start(outputs, &mut machine, real)?;
     let mut teller = Teller::start(real)?;
     platform::listen_for_stop();
@@ -80,6 +82,7 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     drop(held);
     attached.post(Entry::new(Event::Stop).at(machine.now()).message(summary::ended(&over)));
     let wall = (clock::nanoseconds() - started) as f64 * 1e-9;
+    keep::finish(keeping, &mut machine);
     let lost = writer.finish(&mut machine, args)?;
     teller.finish(&mut machine);
     let recorded = machine.finish_recording();
@@ -111,7 +114,7 @@ fn speed(args: &RunArgs, project: &Project) -> Speed {
     args.speed.unwrap_or(if ends || demonstration { Speed::Max } else { Speed::Factor(1.0) })
 }
 
-fn build(args: &RunArgs, project: &Project, speed: Speed) -> Result<Machine, Exit> {
+fn build(args: &RunArgs, project: &Project, speed: Speed, keep: &Keep) -> Result<Machine, Exit> {
     let executor = match args.engine {
         EngineKind::Jit => ExecutorKind::Jit,
         EngineKind::Interp => ExecutorKind::Interpreter,
@@ -122,6 +125,7 @@ fn build(args: &RunArgs, project: &Project, speed: Speed) -> Result<Machine, Exi
         clock,
         alarm: matches!(clock, Clock::Real(_)),
         stopwatch: Some(clock::nanoseconds),
+        retained: keep.source(),
         until: args.until.clone(),
         preempt: Vec::new(),
         native_stack: Some(crate::machine::NATIVE_STACK),

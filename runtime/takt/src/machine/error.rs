@@ -2,6 +2,7 @@
 
 use crate::manifest::ManifestErrors;
 use crate::program::Compiled;
+use crate::retain::Refusal;
 use std::fmt;
 use takt_abi::Fault;
 use takt_engine::{AccessError, LoadError};
@@ -16,6 +17,8 @@ pub enum BuildError {
     Manifest(ManifestErrors),
     /// The engine refuses the program.
     Load(LoadError),
+    /// Retained values do not go with the program.
+    Retain(Vec<Refusal>),
     /// The file service cannot be started.
     Files(std::io::Error),
 }
@@ -35,6 +38,15 @@ impl fmt::Display for BuildError {
             }
             Self::Manifest(errors) => write!(f, "{errors}"),
             Self::Load(error) => write!(f, "{error}"),
+            Self::Retain(refused) => {
+                write!(f, "retained values do not go with the program:")?;
+                refused.iter().try_for_each(|refusal| write!(f, "\n  {}: {}", refusal.path, refusal.reason))?;
+                write!(
+                    f,
+                    "\nNothing was loaded or changed. `takt retain export` writes the values down to be corrected and imported; \
+                     `takt run --cold` starts RETAIN variables, `takt run --origin` all of them, with their initial values"
+                )
+            }
             Self::Files(error) => write!(f, "the file service: {error}"),
         }
     }
