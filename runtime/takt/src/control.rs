@@ -27,7 +27,7 @@ mod socket;
 
 pub use port::{Mode, Port};
 
-use crate::journal::Poster;
+use crate::journal::{Entry, Event, Poster};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -110,11 +110,15 @@ impl Control {
         let listener = socket::bind(&path).map_err(|message| ControlError { path: path.clone(), message })?;
         let (port, line) = port::pair();
         let end = Arc::new(AtomicBool::new(false));
+        let defect = journal.clone();
         let mut server = server::Server::new(listener, about, line, journal, end.clone());
         let work = move || {
             let served = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| server.run()));
             if served.is_err() {
                 stop.stop();
+                if let Some(journal) = defect {
+                    journal.post(Entry::new(Event::Fault).message("internal defect of Takt in the control server; please report it"));
+                }
             }
         };
         let thread = std::thread::Builder::new().name("takt-control".into()).spawn(work);

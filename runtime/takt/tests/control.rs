@@ -45,13 +45,16 @@ struct Machine {
 
 impl Machine {
     fn start(test: &str) -> Self {
+        Self::start_with(test, &[])
+    }
+    fn start_with(test: &str, more: &[&str]) -> Self {
         let folder = std::env::temp_dir().join(format!("takt-control-{test}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(folder.join("src")).unwrap();
         std::fs::write(folder.join("takt.toml"), "[project]\nname = \"pump\"\n").unwrap();
         std::fs::write(folder.join("src/GVL.st"), PROGRAM).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
-        command.args(["run", ".", "--speed", "real"]).current_dir(&folder).env("LC_ALL", "C");
+        command.args(["run", ".", "--speed", "real"]).args(more).current_dir(&folder).env("LC_ALL", "C");
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut machine = Self { folder, child: Some(child) };
         let start = Instant::now();
@@ -392,6 +395,28 @@ fn the_tool_talks_to_people_and_tools() {
     assert!(code == 2 && err.contains("journal.jsonl"), "{err}");
     let (code, out, _) = machine.takt(&["log"]);
     assert!(code == 0 && out.contains("Level 5 → 6") && out.contains("“x”"), "{out}");
+}
+
+/// Reads, subscriptions to every scan, forces and writes: all of it is done between scans without memory being asked for or mapped.
+#[test]
+fn what_clients_do_costs_the_scans_no_memory() {
+    let mut machine = Machine::start_with("quiet", &["--stats", "stats.json"]);
+    let mut client = machine.armed();
+    let all: Vec<String> = (0..1000).map(|i| format!("Many[{i}]")).collect();
+    client.good(json!({ "request": "subscribe", "variables": all, "period_ms": 10 }));
+    client.good(json!({ "request": "subscribe", "variables": ["A", "B", "Name"], "scans": 1 }));
+    for i in 0..100 {
+        client.good(json!({ "request": "read", "variables": ["Many", "A"] }));
+        client.good(json!({ "request": "status" }));
+        client.good(json!({ "request": "write", "variables": [{ "variable": "Level", "value": i % 100 }] }));
+        client.good(force(&format!("Many[{i}]"), json!(i)));
+    }
+    client.good(json!({ "request": "release-all", "restore": true }));
+    drop(client);
+    assert_eq!(machine.stop().0, 0);
+    let stats: Value = serde_json::from_str(&std::fs::read_to_string(machine.folder.join("stats.json")).unwrap()).unwrap();
+    let thread = &stats["thread"];
+    assert_eq!((&thread["allocations"], &thread["major_faults"]), (&json!(0), &json!(0)), "{thread}");
 }
 
 #[test]

@@ -265,7 +265,12 @@ fn tell_fault(machine: &Machine, attached: &mut Attached) {
         && let Some(record) = machine.fault()
     {
         let language = language::of_environment();
-        console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}\n{}", Word::Fault.text(language), Word::WaitsForReset.text(language)));
+        if record.fault == takt_abi::Fault::Stopped {
+            console::tell(Word::Stopped.text(language));
+        } else {
+            console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}", Word::Fault.text(language)));
+        }
+        console::tell(Word::WaitsForReset.text(language));
     }
 }
 

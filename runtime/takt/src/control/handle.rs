@@ -62,7 +62,7 @@ impl Server {
             Request::Parameters {} => self.parameters(client, id),
             Request::Read { variables } => {
                 let (names, spans) = self.copied(&variables)?;
-                let bytes = vec![0; job::length(&spans)];
+                let bytes = job::bytes(&spans);
                 self.demand(client, id, Work::Read { spans, bytes }, Kind::Read(names.to_vec()));
                 Ok(())
             }
@@ -201,7 +201,7 @@ impl Server {
             return Ok(());
         }
         let (names, spans) = self.copied(&names)?;
-        let bytes = vec![0; job::length(&spans)];
+        let bytes = job::bytes(&spans);
         self.demand(client, id, Work::Read { spans, bytes }, Kind::Parameters(names.to_vec()));
         Ok(())
     }
@@ -315,7 +315,7 @@ impl Server {
         let row = job::length(&spans);
         let kind = match (period, scans) {
             (Some(period), None) if limits::PERIOD_MS.contains(&period) => {
-                let bytes = vec![0; row];
+                let bytes = job::bytes(&spans);
                 let job = Box::new(Job::new(0, Work::Read { spans: spans.clone(), bytes }));
                 Rhythm::Period { period: Duration::from_millis(period), next: Instant::now(), job: Some(job) }
             }

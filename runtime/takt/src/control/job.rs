@@ -39,6 +39,18 @@ impl Job {
     }
 }
 
+/// An empty list with room for so many, all of which has been written to: no page of it is mapped while the port fills it.
+fn room<T: Clone>(len: usize, of: T) -> Vec<T> {
+    let mut list = vec![of; len];
+    list.clear();
+    list
+}
+
+/// Bytes for a read, all of which have been written to.
+pub(super) fn bytes(spans: &[Span]) -> Vec<u8> {
+    vec![1; length(spans)]
+}
+
 /// What is to be done.
 #[derive(Debug)]
 pub enum Work {
@@ -145,8 +157,8 @@ impl Status {
             io_fault: None,
             io_faults: 0,
             at_rest: false,
-            forces: Vec::with_capacity(takt_engine::FORCES),
-            bytes: Vec::with_capacity(2 * takt_engine::FORCED_BYTES),
+            forces: room(takt_engine::FORCES, Place { offset: 1, ty: takt_ir::TypeId(0) }),
+            bytes: room(2 * takt_engine::FORCED_BYTES, 1),
         }
     }
 }
@@ -194,7 +206,7 @@ impl Sampler {
     /// With all its room; `row` is the sum of the lengths.
     pub fn new(ticket: u64, spans: Arc<[Span]>, every: u64, row: usize) -> Self {
         let rows = (BATCH / row.max(1)).clamp(1, ROWS);
-        let batch = || Batch { stamps: Vec::with_capacity(rows), bytes: Vec::with_capacity(rows * row), rows, missed: 0 };
+        let batch = || Batch { stamps: room(rows, (1, Time(1))), bytes: room(rows * row, 1), rows, missed: 0 };
         let batch = || Box::new(Job::new(ticket, Work::Batch(batch())));
         Self { ticket, spans, every, next: 0, filling: None, spare: (0..BATCHES).map(|_| batch()).collect(), missed: 0 }
     }
