@@ -224,7 +224,11 @@ fn damaged_files_stop_the_start_and_stay() {
         std::fs::write(folder.join("kept").join(name), "garbage").unwrap();
     }
     check(&folder, &run, 2, "", "it is no file with retained values");
+    check(&folder, &["run", ".", "--state", "kept", "--cycles", "5", "--cold"], 2, "", "move these files away");
     assert_eq!(std::fs::read_to_string(folder.join("kept/retain.0")).unwrap(), "garbage");
+    check(&folder, &["run", ".", "--state", "kept", "--cycles", "5", "--origin"], 0, "", "");
+    assert_eq!(std::fs::read_to_string(folder.join("kept/retain.0.unreadable")).unwrap(), "garbage");
+    check(&folder, &run, 0, "n = 10\n", "");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -37,8 +37,11 @@ impl Keep {
         };
         let loaded = match &state {
             Some(state) if kind != Reset::Origin => slot::load(state.path()).map_err(|error| usage(&error.to_string()))?,
-            // What is there is replaced, whole or not.
-            Some(state) => slot::load(state.path()).unwrap_or_default(),
+            // What cannot be read must not be taken for the newest one later.
+            Some(state) => match slot::load(state.path()) {
+                Ok(loaded) => loaded,
+                Err(_) => slot::set_aside(state.path()).map_err(|error| usage(&format!("{}: {error}", state.path().display())))?,
+            },
             None => Loaded::default(),
         };
         if let Some((path, defect)) = &loaded.torn {

@@ -210,6 +210,17 @@ pub fn load(folder: &Path) -> Result<Loaded, LoadError> {
     Ok(Loaded { newest, torn: broken.pop() })
 }
 
+/// Renames the files, so that a run starts without any.
+pub fn set_aside(folder: &Path) -> std::io::Result<Loaded> {
+    for name in FILES {
+        let path = folder.join(name);
+        if path.exists() {
+            std::fs::rename(&path, folder.join(format!("{name}.unreadable")))?;
+        }
+    }
+    Ok(Loaded::default())
+}
+
 type Parsed = Result<Generation, Defect>;
 
 fn read_file(path: &Path) -> std::io::Result<Option<Parsed>> {
