@@ -60,6 +60,13 @@ fn newest(folder: &Path) -> Option<Generation> {
     loaded.newest.map(|(generation, _)| generation)
 }
 
+/// Whether a generation behind that number was begun; the files may be half written just now.
+fn is_newer(folder: &Path, number: u64) -> bool {
+    let files = slot::FILES.iter().filter_map(|name| std::fs::read(folder.join(".takt").join(name)).ok());
+    let numbers = files.filter_map(|bytes| Some(u64::from_le_bytes(bytes.get(24..32)?.try_into().ok()?)));
+    numbers.max().is_some_and(|found| found > number)
+}
+
 fn number(generation: &Generation, path: &str) -> u64 {
     let place = generation.description.places.iter().position(|p| p.path.ends_with(path)).unwrap();
     u64::from_le_bytes(generation.value(place)[..8].try_into().unwrap())
@@ -75,9 +82,16 @@ fn killed(name: &str, times: u32) {
         let started = Instant::now();
         let mut run: Child = takt(&folder, &["run", "."]).stdout(Stdio::null()).stderr(Stdio::null()).stdin(Stdio::null()).spawn().unwrap();
         random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        // From before the program runs to some generations later.
+        // By turns at any instant, perhaps before the program runs, and while it writes.
         let instant = Duration::from_micros(random >> 33 & 0x3_ffff);
-        std::thread::sleep(instant.saturating_sub(started.elapsed()));
+        if time % 2 == 0 {
+            std::thread::sleep(instant.saturating_sub(started.elapsed()));
+        } else {
+            while !is_newer(&folder, before.0) && started.elapsed() < Duration::from_secs(60) {
+                std::thread::yield_now();
+            }
+            std::thread::sleep(instant / 8);
+        }
         run.kill().unwrap();
         run.wait().unwrap();
         let Some(generation) = newest(&folder) else { continue };
