@@ -14,7 +14,7 @@ use takt_engine::{Clock, ExecutorKind};
 use takt_syntax::Source;
 
 /// A machine with a fast task that counts and a slow one with this body.
-fn machine(variables: &str, body: &str, executor: ExecutorKind) -> Machine {
+fn machine(variables: &str, body: &str, executor: ExecutorKind, watchdog: &str) -> Machine {
     let text = format!(
         "PROGRAM Fast VAR n : UDINT; END_VAR n := n + 1; END_PROGRAM
 PROGRAM Slow VAR i, turns : DINT; {variables} END_VAR
@@ -27,7 +27,7 @@ PROGRAM a WITH Fast : Fast; PROGRAM b WITH Slow : Slow;
 END_RESOURCE END_CONFIGURATION"
     );
     let list = vec![Source { name: "main.st".into(), text }];
-    let manifest = takt::manifest::read("takt.toml", "[task.Slow]\nwatchdog = \"50ms\"\n").expect("a manifest");
+    let manifest = takt::manifest::read("takt.toml", &format!("[task.Slow]\nwatchdog = \"{watchdog}\"\n")).expect("a manifest");
     let project = Project { root: std::env::temp_dir(), sources: Sources { list, ..Sources::default() }, manifest, ..Project::default() };
     let setup = Setup {
         executor,
@@ -84,7 +84,7 @@ fn measure(seconds: i64) {
     let mut alone = None;
     for executor in [ExecutorKind::Jit, ExecutorKind::Interpreter] {
         for (name, body) in &cases {
-            let mut machine = machine(vars, body, executor);
+            let mut machine = machine(vars, body, executor, "10s");
             run(&mut machine, Time::from_millis(seconds * 1000));
             let us = |ns: u64| ns as f64 * 1e-3;
             let (fast, slow) = (machine.engine().statistics(0).clone(), machine.engine().statistics(1).clone());
@@ -112,7 +112,7 @@ fn measure(seconds: i64) {
             ("blocks", format!("WHILE i >= 0 DO {} END_WHILE", calls(400, inverse))),
         ];
         for (name, body) in &endless {
-            let mut machine = machine(vars, body, executor);
+            let mut machine = machine(vars, body, executor, "50ms");
             run(&mut machine, Time::from_millis(1000));
             let took = machine.engine().statistics(1).scan_ns.max() as f64 * 1e-6;
             let fault = machine.fault().map_or_else(|| "none".to_string(), |fault| fault.fault.to_string());
