@@ -86,8 +86,8 @@ pub(super) fn of_plcopen(task: &Element<'_>, writer: &mut Writer) -> Plan {
         push_priority(&mut plan, &priority.value, priority.at.clone(), writer);
     }
     if let Some(watchdog) = settings.and_then(|s| s.child("Watchdog")).filter(|w| w.value("Enabled") == Some("true")) {
-        let reason = "a time limit belongs to the machine, not to the program";
-        writer.left(&watchdog.open, &format!("the watchdog of the task `{}`", plan.name), reason);
+        let reason = format!("a time limit belongs to the machine: give it as `watchdog` under [task.{}] in takt.toml", plan.name);
+        writer.left(&watchdog.open, &format!("the watchdog of the task `{}`", plan.name), &reason);
     }
     for instance in task.children().filter(|child| child.name == "pouInstance") {
         let (name, at) = name_of(instance);
