@@ -180,8 +180,6 @@ pub struct Wishes {
     pub priority: u8,
     /// Its processor.
     pub cpu: Option<u16>,
-    /// It spins.
-    pub spins: bool,
     /// The state folder, absolute.
     pub state: Option<PathBuf>,
 }
@@ -193,7 +191,7 @@ pub fn examine(root: &Path, wishes: &Wishes) -> Vec<Finding> {
         system::kernel(&files),
         system::priority(&files, wishes.priority),
         system::memory(&files),
-        system::throttling(&files, wishes.spins),
+        system::throttling(&files),
         machine::governor(&files),
         machine::isolation(&files),
         machine::clock(&files),

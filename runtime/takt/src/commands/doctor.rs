@@ -5,7 +5,6 @@ use crate::console;
 use crate::doctor::{self, Level, Wishes};
 use crate::language::{self, Word};
 use crate::{project, state};
-use takt_abi::Time;
 
 pub(super) fn execute(args: &DoctorArgs) -> Exit {
     match try_examine(args) {
@@ -20,12 +19,8 @@ fn try_examine(args: &DoctorArgs) -> Result<Exit, Exit> {
     };
     let realtime = settings.as_ref().map(|project| project.manifest.realtime).unwrap_or_default();
     let state = settings.as_ref().map(|project| state::folder_of(project, args.state.as_deref()));
-    let wishes = Wishes {
-        priority: realtime.priority,
-        cpu: realtime.cpu,
-        spins: realtime.spin > Time(0),
-        state: state.map(|state| std::path::absolute(&state).unwrap_or(state)),
-    };
+    let wishes =
+        Wishes { priority: realtime.priority, cpu: realtime.cpu, state: state.map(|state| std::path::absolute(&state).unwrap_or(state)) };
     let language = language::of_environment();
     let findings = doctor::examine(&args.root, &wishes);
     if args.json {

@@ -53,15 +53,17 @@ pub(super) fn memory(files: &Files) -> Finding {
     }
 }
 
-pub(super) fn throttling(files: &Files, spins: bool) -> Finding {
+/// Up to Linux 6.11 a limit for all real-time threads of a processor; since then time that ordinary ones are granted (`fair_server`, in debugfs).
+pub(super) fn throttling(files: &Files) -> Finding {
     let name = "/proc/sys/kernel/sched_rt_runtime_us";
     let Some(runtime) = files.text(name).and_then(|text| text.parse::<i64>().ok()) else {
         return Finding::unknown(Topic::Throttling, name);
     };
     let period = files.text("/proc/sys/kernel/sched_rt_period_us").and_then(|text| text.parse::<i64>().ok()).unwrap_or(1_000_000);
-    let found = format!("{runtime} µs / {period} µs");
-    // The usual 95 % only matter to a thread that rarely sleeps.
-    if runtime < 0 || (runtime * 10 >= period * 9 && !spins) {
+    let server = files.text("/sys/kernel/debug/sched/fair_server/cpu0/runtime").and_then(|text| text.parse::<u64>().ok());
+    let granted = server.map_or_else(String::new, |ns| format!(", fair_server {} µs", ns / 1000));
+    let found = format!("{runtime} µs / {period} µs{granted}");
+    if runtime < 0 && server.is_none_or(|ns| ns == 0) {
         Finding::ok(Topic::Throttling, found)
     } else {
         Finding::advice(Topic::Throttling, found, Word::HelpThrottling)

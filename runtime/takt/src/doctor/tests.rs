@@ -7,7 +7,7 @@ fn tree(name: &str) -> PathBuf {
 }
 
 fn wishes(state: &str) -> Wishes {
-    Wishes { priority: 80, cpu: Some(3), spins: false, state: Some(state.into()) }
+    Wishes { priority: 80, cpu: Some(3), state: Some(state.into()) }
 }
 
 fn of(findings: &[Finding], topic: Topic) -> (Level, &str) {
@@ -67,10 +67,8 @@ fn disks_are_told_apart_by_the_longest_mount() {
 }
 
 #[test]
-fn a_spinning_thread_minds_the_throttling_and_a_missing_processor_is_told() {
-    let wishes = Wishes { spins: true, cpu: Some(9), ..Wishes::default() };
-    let findings = examine(&tree("station"), &wishes);
-    assert_eq!(of(&findings, Topic::Throttling).0, Level::Advice);
+fn a_missing_processor_is_told() {
+    let findings = examine(&tree("station"), &Wishes { cpu: Some(9), ..Wishes::default() });
     assert_eq!(of(&findings, Topic::Processor), (Level::Missing, "cpu = 9"));
 }
 
