@@ -4,6 +4,7 @@ use super::outputs::warning;
 use super::run::usage;
 use super::{Exit, RunArgs};
 use crate::console;
+use crate::journal::{Entry, Event};
 use crate::language::{self, Word};
 use crate::machine::Machine;
 use crate::project::Project;
@@ -81,6 +82,19 @@ impl Keep {
         };
         let writer = Writer::start(state.path(), &project.name, program, &self.loaded, reader, tell);
         writer.map(Some).map_err(|error| usage(&error.to_string()))
+    }
+
+    /// For the journal: which values the machine started from.
+    pub(super) fn loaded(&self, machine: &Machine) -> Option<Entry> {
+        let (migration, (generation, _)) = (machine.migration()?, self.loaded.newest.as_ref()?);
+        let kind = match self.kind {
+            Reset::Warm => "warm",
+            Reset::Cold => "cold",
+            Reset::Origin => "origin",
+        };
+        let (number, added, gone) = (generation.number, migration.added.len(), migration.removed.len() + migration.dropped.len());
+        let message = format!("{kind} start from retained values, generation {number}, {added} new, {gone} put aside");
+        Some(Entry::new(Event::Load).variable(&generation.description.project).message(message))
     }
 
     fn tell(&self, state: &State, machine: &Machine) -> Result<(), String> {

@@ -61,6 +61,7 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
     let mut outputs = Outputs::open(args, &machine)?;
     outputs.show_forces(attached.force_count());
     let keeping = keep.start(&project, &mut machine)?;
+    keep.loaded(&machine).into_iter().for_each(|entry| attached.post(entry));
     let mut writer = Writer::start(outputs, &mut machine, real)?;
     let mut teller = Teller::start(real)?;
     platform::listen_for_stop();
