@@ -10,6 +10,7 @@ mod keep;
 mod live;
 mod log;
 mod outputs;
+mod param;
 mod replay;
 mod retain;
 mod run;
@@ -58,6 +59,8 @@ enum Command {
     Doctor(DoctorArgs),
     /// Lets a project start with the computer, as a systemd service.
     Service(ServiceArgs),
+    /// Shows, sets, saves and compares the parameters of a machine: its PERSISTENT variables.
+    Param(param::ParamArgs),
     /// Saves a project with what its machine keeps between runs.
     Backup(BackupArgs),
     /// Brings a backup back.
@@ -401,6 +404,7 @@ pub fn execute(cli: Cli) -> Exit {
         Command::Log(args) => log::execute(&args),
         Command::Doctor(args) => doctor::execute(&args),
         Command::Service(args) => service::execute(&args),
+        Command::Param(args) => param::execute(&args),
         Command::Backup(args) => backup::save(&args),
         Command::Restore(args) => backup::restore(&args),
         Command::Retain { command } => retain::execute(&command),

@@ -517,3 +517,37 @@ fn a_thousand_connections_leave_room_for_nobody_else_and_go_again() {
         client.ask(json!({ "request": "hello", "version": 1 })).get("result").is_some()
     });
 }
+
+#[test]
+fn parameters_are_set_saved_and_compared_whether_the_machine_runs_or_not() {
+    let mut machine = Machine::start("param");
+    let param = |machine: &Machine, arguments: &[&str]| machine.takt(&[&["param"], arguments].concat());
+    assert_eq!(param(&machine, &["get", "Recipe.Speed"]).1, "GVL.Recipe.Speed = 2.5\n");
+    let (code, _, err) = param(&machine, &["set", "Recipe.Speed=3.5"]);
+    assert!(code == 2 && err.contains("--reason"), "{err}");
+    let (code, out, err) = param(&machine, &["set", "Recipe.Speed=3.5", "--reason", "x"]);
+    assert_eq!((code, out.as_str()), (0, "GVL.Recipe.Speed: 2.5 → 3.5\n"), "{err}");
+    assert_eq!(machine.connect().read("GVL.Recipe.Speed"), 3.5);
+    assert_eq!(param(&machine, &["export", "a.toml"]).0, 0);
+    assert_eq!((param(&machine, &["diff", "a.toml"]).0, machine.stop().0), (0, 0));
+    // Now in what the machine keeps.
+    assert_eq!(param(&machine, &["get", "GVL.Recipe.Speed"]).1, "GVL.Recipe.Speed = 3.5\n");
+    let file = std::fs::read_to_string(machine.folder.join("a.toml")).unwrap();
+    for (wrong, part) in [
+        (file.replace("3.5", "fast"), "fast"),
+        (file.replace("Speed", "Sped"), "no parameter"),
+        (file.replace("schema = 1", "schema = 2"), "version 2"),
+        ("[".repeat(10_000), "b.toml"),
+    ] {
+        std::fs::write(machine.folder.join("b.toml"), wrong).unwrap();
+        let (code, _, err) = param(&machine, &["import", "b.toml", "--reason", "x"]);
+        assert!(code == 2 && err.contains(part), "{err}");
+    }
+    std::fs::write(machine.folder.join("a.toml"), file.replace("3.5", "7.25")).unwrap();
+    let (code, out, _) = param(&machine, &["diff", "a.toml"]);
+    assert!(code == 1 && out.contains("3.5 | 7.25"), "{out}");
+    assert_eq!(param(&machine, &["import", "a.toml", "--reason", "x"]).0, 0);
+    assert_eq!(param(&machine, &["get"]).1, "GVL.Recipe.Speed = 7.25\n");
+    let written = machine.journal("write");
+    assert!(written.len() == 2 && written[1]["from"] == "takt param" && written[1]["new"] == "7.25", "{written:?}");
+}
