@@ -8,7 +8,7 @@ use crate::object::{Bound, Target};
 use crate::operator::Class;
 use crate::place::Place;
 use crate::scope::{Item, Owner, PouKind, Variable, key, same};
-use takt_abi::{FnDesc, Section};
+use takt_abi::{Elem, FnDesc, Section};
 use takt_ir::{Base, Field, Inst, Local, Mem, StructKind, Structure, Ty, Type, TypeId};
 use takt_syntax::tree::{Arg, ArgKind, Expr, ExprKind, VarKind};
 use takt_syntax::{Code, Span};
@@ -425,6 +425,7 @@ impl<'a> Lowering<'_, 'a> {
             (Type::String(wanted), Type::String(found)) | (Type::WString(wanted), Type::WString(found)) => found >= wanted,
             // An enumeration is handed on as the integer that it is; not the other way, where any number could come out.
             (Type::Elem(wanted), Type::Enum(found)) => found.base == *wanted,
+            (Type::Elem(wanted), Type::Elem(found)) => wanted == found || are_same_bits(*wanted, *found),
             _ => self.refers_to(ty, operand.ty),
         };
         if !same {
@@ -674,4 +675,18 @@ fn section(kind: VarKind) -> Section {
         VarKind::InOut => Section::InOut,
         _ => Section::State,
     }
+}
+
+/// Whether one is a bit string and the other an integer of its width, as WORD and UINT, which TwinCAT passes for each other.
+fn are_same_bits(a: Elem, b: Elem) -> bool {
+    let of_bits = |bits, integer| {
+        matches!(
+            (bits, integer),
+            (Elem::Byte, Elem::Usint | Elem::Sint)
+                | (Elem::Word, Elem::Uint | Elem::Int)
+                | (Elem::Dword, Elem::Udint | Elem::Dint)
+                | (Elem::Lword, Elem::Ulint | Elem::Lint)
+        )
+    };
+    of_bits(a, b) || of_bits(b, a)
 }

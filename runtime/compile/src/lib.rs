@@ -70,6 +70,8 @@ pub struct Input<'a> {
 pub struct Options {
     /// Name of the project, with which the paths of instances begin; if it is empty, `Application`.
     pub name: String,
+    /// Names of libraries that are compiled along with the program, by which their units may be called: `TcUnit` in `TcUnit.FB_TestSuite`.
+    pub namespaces: Vec<String>,
     /// Cut integers at each operator instead of when stored, passed or converted.
     pub iec_arithmetic: bool,
     /// Implicit conversions that may lose information are errors.

@@ -39,6 +39,11 @@ impl<'a> Lowering<'_, 'a> {
         let ty = self.c.elem(elem);
         if let (Value::Int(v), false) = (&value, flex) {
             let (low, high) = crate::constant::range(elem);
+            if elem == Elem::Ltime && (high + 1..=i128::from(u64::MAX)).contains(v) {
+                // Other controllers count up to here without a sign; the bits are the same.
+                self.report(Code::ConstantOverflow, span, "`LTIME` ends at 292 years: a literal beyond it is negative here".to_string());
+                return self.constant(Value::Int(i128::from(*v as u64 as i64)), ty, span);
+            }
             if !(low..=high).contains(v) {
                 let name = takt_ir::elem_name(elem);
                 self.report(Code::OutOfRange, span, format!("this literal does not fit the type `{name}`"));

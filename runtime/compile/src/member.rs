@@ -64,7 +64,7 @@ impl<'a> Lowering<'_, 'a> {
                 match self.c.item_in(space, library, &member.text) {
                     Some(item) => self.item(item, &member.text, span),
                     None => {
-                        let what = if let Item::Library = space { "library" } else { "namespace" };
+                        let what = if let Item::Library | Item::Sources = space { "library" } else { "namespace" };
                         self.report(Code::UnknownMember, member.span, format!("the {what} has no `{}`", member.text));
                         Thing::Error
                     }

@@ -133,7 +133,7 @@ impl<'a> Lowering<'_, 'a> {
             Item::Ready(ty) | Item::NativeBlock(ty) => Thing::Type(ty),
             Item::NativeFunction(desc) => Thing::Native(desc),
             Item::List(i) => Thing::List(i),
-            Item::Library | Item::Namespace(_) => Thing::Space(item),
+            Item::Library | Item::Sources | Item::Namespace(_) => Thing::Space(item),
             Item::Enumerator(ty, value) => Thing::Value(self.constant(Value::Int(value.into()), ty, span)),
             Item::Member(declared, member) => self.declared_member(declared, member, span),
             Item::Ambiguous => {

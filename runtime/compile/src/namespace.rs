@@ -46,7 +46,17 @@ impl<'a> Compiler<'a> {
         {
             return Some(found);
         }
-        self.names.get(&key).or_else(|| self.library_names.get(&key)).copied().or_else(|| self.namespace(&key))
+        self.names
+            .get(&key)
+            .or_else(|| self.library_names.get(&key))
+            .copied()
+            .or_else(|| self.namespace(&key))
+            .or_else(|| self.own_library(&key))
+    }
+
+    /// The sources, if that is the name of a library among them.
+    fn own_library(&self, key: &str) -> Option<Item> {
+        self.options.namespaces.iter().any(|name| crate::scope::key(name) == key).then_some(Item::Sources)
     }
 
     fn near_name(&self, key: &str) -> Option<Item> {
@@ -70,6 +80,7 @@ impl<'a> Compiler<'a> {
         match item {
             Item::Namespace(space) => self.in_namespace(&self.namespaces[space], &key(name)),
             Item::Library => self.library_member(library, name),
+            Item::Sources => self.names.get(&key(name)).copied().or_else(|| self.namespace(&key(name))),
             _ => None,
         }
     }
@@ -93,7 +104,8 @@ impl<'a> Compiler<'a> {
                 Unit::Interface(unit) => &unit.home,
             };
             for name in &home.using {
-                let library = matches!(self.library_names.get(&key(&name.text)), Some(Item::Library));
+                let library =
+                    matches!(self.library_names.get(&key(&name.text)), Some(Item::Library)) || self.own_library(&key(&name.text)).is_some();
                 if !library && !self.namespaces.contains(&key(&name.text)) {
                     self.report(Code::UnknownName, name.span, format!("there is no namespace `{}`", name.text));
                 }

@@ -205,5 +205,7 @@ pub(crate) enum Item {
     /// Member of a declared enumeration that may not be resolved yet.
     Member(usize, usize),
     Library,
+    /// The sources themselves, by the name of a library among them.
+    Sources,
     Namespace(usize),
 }

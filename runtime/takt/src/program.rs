@@ -55,6 +55,7 @@ pub fn compile(project: &Project, conditions: &[Condition]) -> Compiled {
     let name = |condition: &Condition| if condition.span.is_some() { manifest_name } else { "--until" }.to_string();
     let options = takt_compile::Options {
         name: project.name.clone(),
+        namespaces: project.sources.namespaces.clone(),
         iec_arithmetic: project.manifest.arithmetic == Arithmetic::Iec,
         strict: project.manifest.strict,
         lint: true,

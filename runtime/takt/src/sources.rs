@@ -39,6 +39,8 @@ pub struct Sources {
     pub converted: Vec<(String, Encoding)>,
     /// Where texts come from that were made from other files, by their index.
     pub origins: BTreeMap<usize, Arc<Origin>>,
+    /// What TwinCAT's projects among them are called, so that their units may be named with it.
+    pub namespaces: Vec<String>,
     /// What could not be read. Spans are in the texts of the list.
     pub findings: Vec<Diagnostic>,
 }
@@ -142,12 +144,13 @@ struct Reading {
     files: Vec<Read>,
     tasks: Vec<Source>,
     task_folder: PathBuf,
+    namespaces: Vec<String>,
     converted: Vec<(String, Encoding)>,
 }
 
 impl Reading {
     fn new(style: Style) -> Self {
-        Self { style, files: Vec::new(), tasks: Vec::new(), task_folder: PathBuf::new(), converted: Vec::new() }
+        Self { style, files: Vec::new(), tasks: Vec::new(), task_folder: PathBuf::new(), namespaces: Vec::new(), converted: Vec::new() }
     }
 
     fn all(&mut self, paths: &[PathBuf]) -> Result<(), SourceError> {
@@ -213,7 +216,9 @@ impl Reading {
         let folder = found.path.parent().unwrap_or(Path::new("")).to_path_buf();
         let mut files = Vec::new();
         let name = source.name.clone();
+        let namespaces = &mut self.namespaces;
         let written = write_xml(self.style, source, &stem(&found.path), |root, writer| {
+            namespaces.extend(plcproj::names(root));
             for item in plcproj::items(root, writer) {
                 let kind = walk::kind_of(&item.path).filter(|kind| !matches!(kind, Kind::Project));
                 match (kind, plcproj::resolve(&folder, &item.path)) {
@@ -256,7 +261,7 @@ impl Reading {
     }
 
     fn sources(self) -> Sources {
-        let mut sources = Sources { converted: self.converted, ..Sources::default() };
+        let mut sources = Sources { converted: self.converted, namespaces: self.namespaces, ..Sources::default() };
         for (index, file) in self.files.into_iter().enumerate() {
             let text = file.written.units.into_iter().next().map_or_else(String::new, |unit| unit.text);
             sources.list.push(Source { name: file.name, text });

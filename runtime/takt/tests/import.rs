@@ -80,6 +80,21 @@ fn a_twincat_project_is_checked_and_run_as_it_is() {
 }
 
 #[test]
+fn units_of_a_library_given_along_may_be_named_with_it() {
+    let folder = copy("library");
+    let user =
+        "FUNCTION IsHeavy : BOOL\nVAR\n    state : Sorter.E_BeltState;\nEND_VAR\n    IsHeavy := Sorter.F_Weigh(50.0);\nEND_FUNCTION\n";
+    fs::write(folder.join("User.st"), user).unwrap();
+    edit(&folder, "twincat/POUs/MAIN.TcPOU", "F_Weigh(", "(IsHeavy() = Sorter.F_Weigh(50.0)) AND Sorter.F_Weigh(");
+    let arguments = ["run", "User.st", "twincat/Sorter.plcproj", "--cycles", "20", "--print", "GVL_Sorter.nHeavy"];
+    check(&folder, &arguments, 0, "GVL_Sorter.nHeavy = 2\n", "");
+    edit(&folder, "User.st", "Sorter.F_Weigh(", "Sorter.F_Wiegh(");
+    let found = findings(&folder, &["User.st", "twincat/Sorter.plcproj"]);
+    assert_eq!(found, [("E0204".to_string(), "User.st".to_string(), 5, 23)]);
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn mistakes_and_faults_stand_where_people_edit() {
     let folder = copy("places");
     check(&folder, &["run", "twincat", "--cycles", "200"], 1, "", "division by zero at twincat/POUs/MAIN.TcPOU:28:14 in MAIN");

@@ -3,6 +3,7 @@
 use crate::constant::Value;
 use crate::expression::{Kind, Lowering, Operand, Thing};
 use crate::place::Place;
+use crate::types::elementary;
 use takt_abi::Elem;
 use takt_ir::{Inst, Local, Op, Type};
 use takt_syntax::tree::{Arg, ExprKind};
@@ -30,9 +31,17 @@ impl<'a> Lowering<'_, 'a> {
                 Thing::Type(ty) => ty,
                 Thing::Value(operand) if !operand.is_error() => operand.ty,
                 Thing::Value(_) | Thing::Error => return self.error(span),
-                _ => {
-                    self.report(Code::BadArgument, value.span, "`SIZEOF` takes one variable or type");
-                    return self.error(span);
+                thing => {
+                    // TIME and LTIME are functions too.
+                    let elem = match (&thing, &value.kind) {
+                        (Thing::Native(_), ExprKind::Name(name)) => elementary(name),
+                        _ => None,
+                    };
+                    let Some(elem) = elem else {
+                        self.report(Code::BadArgument, value.span, "`SIZEOF` takes one variable or type");
+                        return self.error(span);
+                    };
+                    self.c.elem(elem)
                 }
             },
             _ => {

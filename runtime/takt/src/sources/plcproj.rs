@@ -47,6 +47,16 @@ pub(super) fn items(root: &Element<'_>, writer: &mut Writer) -> Vec<Item> {
     items
 }
 
+/// The names of the project as a library, with which others write the names of its units.
+pub(super) fn names(root: &Element<'_>) -> Vec<String> {
+    let groups = root.children().filter(|child| child.name == "PropertyGroup").flat_map(Element::children);
+    let named = groups.filter(|property| matches!(property.name, "Name" | "Title" | "DefaultNamespace"));
+    let mut names: Vec<String> = named.map(|property| property.text().trim().to_string()).filter(|name| !name.is_empty()).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
 /// What an item says of being left out; `None` if it says nothing.
 fn excluded(item: &Element<'_>) -> Option<bool> {
     item.child("ExcludeFromBuild").map(|flag| flag.text().eq_ignore_ascii_case("true"))
@@ -109,7 +119,7 @@ mod tests {
 
     #[test]
     fn files_folders_and_exclusions_are_understood() {
-        let text = r#"<Project><ItemGroup>
+        let text = r#"<Project><PropertyGroup><Name>Lib</Name><Title>Lib</Title><DefaultNamespace>L</DefaultNamespace></PropertyGroup><ItemGroup>
             <Compile Include="POUs\MAIN.TcPOU"><SubType>Code</SubType></Compile>
             <Compile Include="POUs\Old\FB%20A.TcPOU"><SubType>Code</SubType></Compile>
             <Compile Include="POUs\Old\Kept.TcPOU"><ExcludeFromBuild>false</ExcludeFromBuild></Compile>
@@ -118,7 +128,9 @@ mod tests {
             <ItemGroup><Folder Include="POUs\Old"><ExcludeFromBuild>true</ExcludeFromBuild></Folder>
             <PlaceholderReference Include="Tc2_MC2"/></ItemGroup></Project>"#;
         let mut writer = Writer::new(Style::Places, Source { name: "a.plcproj".into(), text: text.into() });
-        let items = items(&super::super::xml::parse(text).unwrap(), &mut writer);
+        let root = super::super::xml::parse(text).unwrap();
+        assert_eq!(names(&root), ["L", "Lib"]);
+        let items = items(&root, &mut writer);
         let paths: Vec<_> = items.iter().map(|item| item.path.to_string_lossy().into_owned()).collect();
         assert_eq!(paths, ["POUs/MAIN.TcPOU", "POUs/Old/Kept.TcPOU"]);
         assert_eq!(&text[items[0].at.clone()], r"POUs\MAIN.TcPOU");
