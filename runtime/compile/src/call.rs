@@ -468,9 +468,10 @@ impl<'a> Lowering<'_, 'a> {
 
     /// Sets inputs, calls the body of an instance or one of its actions, and takes outputs.
     pub(crate) fn call_part(&mut self, instance: Operand, action: Option<(Bound, usize)>, args: &'a [Arg], span: Span) -> Operand {
-        if instance.is_error() {
+        let orphan = self.c.pou_of_type.get(&instance.ty).is_some_and(|unit| self.c.is_orphan(*unit));
+        if instance.is_error() || orphan {
             self.check_arguments(args);
-            return instance;
+            return self.error(span);
         }
         let structure = match self.c.types.get(instance.ty) {
             Type::Struct(s) if matches!(s.kind, StructKind::Block | StructKind::Program) => (**s).clone(),

@@ -90,6 +90,11 @@ impl<'a> Compiler<'a> {
         }
     }
 
+    /// Whether a block inherits from one that is not known.
+    pub(crate) fn is_orphan(&self, pou: usize) -> bool {
+        self.bases(pou).any(|base| self.pous[base].is_orphan)
+    }
+
     fn link_interface(&mut self, i: usize) {
         let tree = self.interfaces[i].tree;
         self.home = Some(&tree.home);
@@ -112,7 +117,10 @@ impl<'a> Compiler<'a> {
                 self.report(Code::NotSupported, name.span, message).help = Some("put an instance of it into the block instead".into());
                 return;
             }
-            found => return self.no_such_unit(name, found.is_some(), "FUNCTION_BLOCK"),
+            found => {
+                self.pous[pou].is_orphan = true;
+                return self.no_such_unit(name, found.is_some(), "FUNCTION_BLOCK");
+            }
         };
         if self.pous[base].tree.modifiers.is_final {
             self.report(Code::BadOverride, name.span, format!("`{}` is FINAL and cannot be extended", name.text));

@@ -111,6 +111,7 @@ impl<'a> Compiler<'a> {
             owner,
             members: HashMap::default(),
             base: None,
+            is_orphan: false,
             children: Vec::new(),
             implements: Vec::new(),
             class: 0,

@@ -246,7 +246,8 @@ impl<'c, 'a> Lowering<'c, 'a> {
         Operand { exact: true, ..self.temp(local, ty, span) }
     }
     pub(crate) fn at(&self, place: Place, ty: TypeId, span: Span) -> Operand {
-        Operand { ty, kind: Kind::Place(place), span, flex: false, exact: true, fixed: None, dynamic: false }
+        let kind = if *self.c.types.get(ty) == Type::Error { Kind::Error } else { Kind::Place(place) };
+        Operand { ty, kind, span, flex: false, exact: true, fixed: None, dynamic: false }
     }
     pub(crate) fn bool_type(&mut self) -> TypeId {
         self.c.elem(Elem::Bool)

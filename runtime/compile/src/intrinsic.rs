@@ -110,6 +110,9 @@ impl<'a> Lowering<'_, 'a> {
         }
         if !is_intrinsic(&upper) {
             self.check_arguments(args);
+            if self.is_in_orphan() {
+                return self.error(span);
+            }
             let help = near_function(&upper).or_else(|| self.c.suggest(name, false));
             self.report(Code::UnknownName, at, format!("there is no function `{name}`")).help = help;
             return self.error(span);

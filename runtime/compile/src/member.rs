@@ -145,6 +145,9 @@ impl<'a> Lowering<'_, 'a> {
     }
 
     pub(crate) fn no_member(&mut self, operand: &Operand, member: &Name) -> Thing {
+        if self.c.pou_of_type.get(&operand.ty).is_some_and(|unit| self.c.is_orphan(*unit)) {
+            return Thing::Error;
+        }
         let name = self.type_name(operand.ty);
         let help = match self.c.types.get(operand.ty) {
             Type::Struct(_) | Type::Interface(_) => {

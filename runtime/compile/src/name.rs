@@ -95,6 +95,9 @@ impl<'a> Lowering<'_, 'a> {
                     let ty = self.c.elem(Elem::Lword);
                     return Thing::Value(Operand { flex: true, ..self.constant(Value::Int(0), ty, span) });
                 }
+                if self.is_in_orphan() {
+                    return Thing::Error;
+                }
                 let help = self.suggest(name);
                 self.c.unknown_name(self.pou, name, span, help);
                 Thing::Error

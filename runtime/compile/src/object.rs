@@ -69,9 +69,17 @@ impl<'a> Lowering<'_, 'a> {
         }
     }
 
+    /// Whether the body belongs to a block that inherits from one that is not known.
+    pub(crate) fn is_in_orphan(&self) -> bool {
+        self.block().is_some_and(|class| self.c.is_orphan(class))
+    }
+
     /// What `SUPER^` means: the instance as one of the type that its own extends.
     pub(crate) fn super_instance(&mut self, span: Span) -> Option<Operand> {
         let base = self.block().and_then(|class| self.c.pous[class].base);
+        if base.is_none() && self.is_in_orphan() {
+            return None;
+        }
         let (Some(base), Some(this)) = (base, self.this) else {
             self.report(Code::BadStatement, span, "SUPER is only possible in a FUNCTION_BLOCK that extends another");
             return None;

@@ -122,6 +122,8 @@ pub(crate) struct Pou<'a> {
     pub(crate) members: HashMap<String, Member>,
     /// EXTENDS.
     pub(crate) base: Option<usize>,
+    /// EXTENDS names what there is not: what it inherits is not known, and nothing is said of names that it may have from there.
+    pub(crate) is_orphan: bool,
     /// What extends it directly.
     pub(crate) children: Vec<usize>,
     /// IMPLEMENTS, without what its base implements.
