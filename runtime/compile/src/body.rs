@@ -65,7 +65,10 @@ impl<'a> Compiler<'a> {
         lowering.statements(tree.body);
         lowering.check_labels();
         lowering.return_();
-        lowering.finish()
+        let variables = lowering.variables(pou);
+        let body = lowering.finish();
+        self.program.variables.insert(id, variables);
+        body
     }
 
     /// A BOOL expression in global scope.
@@ -106,6 +109,24 @@ impl<'a> Lowering<'_, 'a> {
             // An action has the temporary variables of its block anew.
             PouKind::Action => self.open_locals(1, statements),
         }
+    }
+
+    /// Where the variables of a call are, for people who look at a fault.
+    fn variables(&mut self, pou: usize) -> takt_ir::Variables {
+        use takt_ir::Home;
+        let home = |storage: &Storage| match storage {
+            Storage::Frame(offset) => Some(Home::Frame(*offset)),
+            Storage::Register(local) => Some(Home::Local(*local)),
+            Storage::Behind(local) => Some(Home::Behind(*local)),
+            _ => None,
+        };
+        let storage = self.own_storage().clone();
+        let vars = self.c.pous[pou].vars.iter().zip(&storage);
+        let mut list: Vec<_> = vars.filter_map(|(v, storage)| Some((v.name.clone(), v.ty, home(storage)?))).collect();
+        if let Some((ty, storage)) = &self.result {
+            list.extend(home(storage).map(|home| (self.c.pous[pou].tree.name.text.clone(), *ty, home)));
+        }
+        takt_ir::Variables { instance: self.this.is_some(), list }
     }
 
     /// The instance that a body of a block runs on.

@@ -125,6 +125,13 @@ impl Engine {
         Some(self.core.record.get_or_init(|| raw.record(&self.core.program)))
     }
 
+    /// The calls that were under way in a task of the interpreter when a fault ended its scan, the innermost first: body, number of the place
+    /// where it was, its locals as words, offset of its frame. Empty under machine code, which keeps no locals.
+    pub fn stopped_calls(&self, task: usize) -> Vec<(BodyId, u32, Vec<u64>, u64)> {
+        let Some(task) = self.core.tasks.get(task) else { return Vec::new() };
+        task.lane.get().interpreter.stopped().map(|(body, site, words, frame)| (body, site.0, words.to_vec(), frame)).collect()
+    }
+
     /// Stops the application as a fault does, with [`Fault::Stopped`]: axes are brought to rest, outputs go to their safe values.
     pub fn halt(&mut self) {
         self.tell(&Command::Halt);

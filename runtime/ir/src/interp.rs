@@ -26,6 +26,8 @@ pub fn run_body(program: &Program, body: BodyId, frame: u64, ctx: &mut Context) 
 pub struct Interpreter {
     words: Vec<u64>,
     calls: Vec<Call>,
+    /// Where the last run ended with a fault.
+    stopped: Option<Call>,
     result: u64,
     /// Accesses refused that the verifier should have excluded. Not 0: a defect of the verifier.
     pub(crate) escapes: u32,
@@ -60,17 +62,32 @@ impl Interpreter {
     pub fn run(&mut self, program: &Program, body: BodyId, frame: u64, ctx: &mut Context) -> u32 {
         self.words.clear();
         self.calls.clear();
-        self.result = 0;
-        let run = Run { program, body: &program.bodies[body.0 as usize], id: body, base: 0, frame, own: self, ctx };
-        match run.all() {
+        (self.result, self.stopped) = (0, None);
+        let mut run = Run { program, body: &program.bodies[body.0 as usize], id: body, base: 0, frame, own: self, ctx };
+        let ended = run.all();
+        let (body, base, frame) = (run.id, run.base, run.frame);
+        match ended {
             Ok(()) => 0,
             Err(code) => {
+                let site = SiteId(ctx.fault_site);
+                self.stopped = Some(Call { body, block: BlockId(0), next: 0, base, frame, dst: None, site });
                 for call in self.calls.iter().rev() {
                     ctx.push_trace(call.site.0);
                 }
                 code
             }
         }
+    }
+
+    /// The calls under way when the last run ended with a fault, the innermost first: body, where it was, its locals as words, and where its
+    /// frame starts.
+    pub fn stopped(&self) -> impl Iterator<Item = (BodyId, SiteId, &[u64], u64)> {
+        let calls = self.stopped.iter().chain(self.stopped.iter().flat_map(|_| self.calls.iter().rev()));
+        calls.scan(self.words.len(), |end, call| {
+            let words = self.words.get(call.base..*end).unwrap_or_default();
+            *end = call.base;
+            Some((call.body, call.site, words, call.frame))
+        })
     }
 
     /// What the last run returned, as a word (see [`crate::Word`]); 0 without a result or after a fault.
@@ -91,7 +108,7 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn all(mut self) -> Result<(), u32> {
+    fn all(&mut self) -> Result<(), u32> {
         self.enter(None, &[])?;
         let mut at = (BlockId(0), 0);
         loop {

@@ -9,6 +9,7 @@ mod calendar;
 mod calls;
 pub mod heap;
 mod inst;
+mod instance;
 mod interp;
 mod literal;
 mod memory;
@@ -28,12 +29,15 @@ mod verify;
 pub use address::{Address, AddressError, Area, Areas, LARGEST_AREA, Mapped, parse_address, placeholder};
 pub use calls::{CallGraph, Components};
 pub use inst::{Base, Block, BlockId, Body, BodyId, Const, Inst, Local, Mem, NativeId, SiteId, Term, Ty};
+pub use instance::instance_at;
 pub use interp::{Interpreter, run_body};
 pub use literal::{ValueError, parse_value};
 pub use op::{Op, Word, ops};
 pub use parse::{ParseError, parse_program};
 pub use print::print_program;
-pub use program::{Class, Dispatch, Family, Global, Instances, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger};
+pub use program::{
+    Class, Dispatch, Family, Global, Home, Instances, NULL_ZONE, Native, Program, ResourceInstance, Site, Task, Trigger, Variables,
+};
 pub use retain::{Latched, RetainKind, Retained};
 pub use symbols::{Place, SymbolError, resolve};
 pub use types::{Enumeration, Field, StructKind, Structure, Type, TypeId, Types, elem_name, elem_size};

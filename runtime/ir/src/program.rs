@@ -1,9 +1,10 @@
 //! A complete program.
 
 use crate::address::{Areas, Mapped};
-use crate::inst::{Body, BodyId, Ty};
+use crate::inst::{Body, BodyId, Local, Ty};
 use crate::retain::{Latched, Retained};
 use crate::types::{TypeId, Types};
+use std::collections::BTreeMap;
 use takt_abi::{Classes, GRANULE, Heap, NativeFn};
 
 /// Bytes at the start of the image that no variable uses, so that NULL and its neighbours are never valid.
@@ -145,6 +146,26 @@ impl Family {
     }
 }
 
+/// Where a variable of a call is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Home {
+    /// In a local.
+    Local(Local),
+    /// In the body's frame.
+    Frame(u32),
+    /// Behind the address in a local.
+    Behind(Local),
+}
+
+/// Variables of a body that live for one call.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Variables {
+    /// The first parameter is the instance that the body runs on.
+    pub instance: bool,
+    /// Names, types and places, in declared order; the result last.
+    pub list: Vec<(String, TypeId, Home)>,
+}
+
 /// A program, ready to be verified and run.
 #[derive(Debug, Clone, Default)]
 pub struct Program {
@@ -193,6 +214,8 @@ pub struct Program {
     pub restart: u32,
     /// Variables of which tasks see a copy.
     pub latched: Vec<Latched>,
+    /// Variables of a call, by body, for people who look at a fault.
+    pub variables: BTreeMap<BodyId, Variables>,
     /// The heap of `__NEW`: first byte and bytes (16 · 2ⁿ, or 0).
     pub heap: (u32, u32),
 }

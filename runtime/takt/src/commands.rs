@@ -2,6 +2,7 @@
 
 mod backup;
 mod check;
+mod core;
 mod ctl;
 mod doctor;
 mod explain;
@@ -45,6 +46,8 @@ pub struct Cli {
 enum Command {
     /// Runs a program or a project.
     Run(Box<RunArgs>),
+    /// Shows what happened when a program faulted, from a core file.
+    Core(CoreArgs),
     /// Runs a recording again, bit for bit.
     Replay(ReplayArgs),
     /// Finds the mistakes in a program or a project.
@@ -131,6 +134,18 @@ pub struct RunArgs {
     /// Draws the run: path, tool axes, speed, valve.
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+struct CoreArgs {
+    /// A core file, or a folder of them to be listed (.takt/cores of a project).
+    file: PathBuf,
+    /// Shows a variable as it was at the fault, and nothing else.
+    #[arg(long, value_name = "VAR")]
+    print: Vec<String>,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
 /// What `takt replay` is told.
@@ -397,6 +412,7 @@ fn assignment(text: &str) -> Result<(String, String), String> {
 pub fn execute(cli: Cli) -> Exit {
     match cli.command {
         Command::Run(args) => run::execute(&args),
+        Command::Core(args) => core::execute(&args),
         Command::Replay(args) => replay::execute(&args),
         Command::Check(args) => check::execute(&args.paths, args.format),
         Command::Import(args) => import::execute(&args),

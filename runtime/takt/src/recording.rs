@@ -8,5 +8,6 @@ pub mod file;
 pub mod header;
 pub mod host;
 pub mod player;
+pub mod postmortem;
 pub mod stream;
 pub mod writer;

@@ -210,12 +210,13 @@ impl Ring {
     }
 }
 
-/// A name that says when: `2026-11-21_21-46-17.core`, with a number behind it where there is one already.
+/// A name that says when (UTC): `2026-11-21_21-46-17-123.core`, with a number behind it where there is one already.
 fn free_name(folder: &Path) -> PathBuf {
-    let seconds = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let (seconds, thousandths) = (since.as_secs(), since.subsec_millis());
     let (days, rest) = ((seconds / 86_400) as i64, seconds % 86_400);
     let (year, month, day) = date(days);
-    let stem = format!("{year:04}-{month:02}-{day:02}_{:02}-{:02}-{:02}", rest / 3600, rest / 60 % 60, rest % 60);
+    let stem = format!("{year:04}-{month:02}-{day:02}_{:02}-{:02}-{:02}-{thousandths:03}", rest / 3600, rest / 60 % 60, rest % 60);
     let name = |number: u32| if number == 0 { format!("{stem}.core") } else { format!("{stem}_{number:03}.core") };
     (0..1000).map(|number| folder.join(name(number))).find(|path| !path.exists()).unwrap_or_else(|| folder.join(name(999)))
 }
