@@ -80,6 +80,8 @@ fn faults(executor: ExecutorKind, folder: PathBuf, count: usize) {
         for _ in 0..2 {
             machine.step();
         }
+        // Faults on a shop floor are further apart than the writing of a file takes.
+        std::thread::sleep(std::time::Duration::from_millis(30));
         machine.engine().command(&Command::Reset(Reset::Warm)).unwrap_or_else(|error| panic!("{i}: {error}"));
     }
     let summary = machine.finish_recording().expect("it was recorded");

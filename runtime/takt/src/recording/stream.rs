@@ -102,7 +102,8 @@ impl Stream {
     pub fn between(&mut self, engine: &Engine) {
         let due = match (self.marked, self.every) {
             (None, _) => true,
-            (Some(_), _) if self.overflow && self.gapless => false,
+            // After a gap a core file starts anew at once; a file ends.
+            (Some(_), _) if self.overflow => !self.gapless,
             (Some(marked), Some(every)) => self.now.0 - marked.0 >= every,
             (Some(_), None) => false,
         };
@@ -129,10 +130,10 @@ impl Stream {
         new
     }
 
-    /// Tells the writer of a fault. After it nothing is in a hurry.
+    /// Tells the writer of a fault. The axes still brake: a writer that is too busy is not waited for.
     pub(super) fn faulted(&mut self, json: String) {
         self.flush();
-        let _ = self.out.send(Message::Fault(json));
+        let _ = self.out.try_send(Message::Fault(json));
     }
 
     /// The end.
