@@ -155,6 +155,9 @@ pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) 
     let executor = match options.executor {
         ExecutorKind::Interpreter => Executor::Interpreter,
         ExecutorKind::Jit => Executor::Jit(Rc::new(takt_jit::compile(&program).map_err(LoadError::Jit)?)),
+        ExecutorKind::Portable => {
+            Executor::Jit(Rc::new(takt_jit::compile_for(&program, takt_jit::Processor::Common).map_err(LoadError::Jit)?))
+        }
     };
     let mut image = Image::new(program.image_size as usize).ok_or(LoadError::Memory { size: program.image_size })?;
     let mut env = Pinned::new(Env {

@@ -12,6 +12,8 @@ pub enum ExecutorKind {
     /// Machine code.
     #[default]
     Jit,
+    /// Machine code without the instructions that only newer processors have; the same results ([`takt_jit::Processor::Common`]).
+    Portable,
     /// The reference interpreter.
     Interpreter,
 }

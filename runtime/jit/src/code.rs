@@ -43,14 +43,26 @@ impl std::error::Error for JitError {}
 /// # Errors
 /// See [`JitError`].
 pub fn compile(program: &Program) -> Result<Code, JitError> {
-    compile_with(program, Defect::None)
+    compile_for(program, Processor::Host)
+}
+
+/// As [`compile`], with the instructions of another processor.
+///
+/// # Errors
+/// See [`JitError`].
+pub fn compile_for(program: &Program, processor: Processor) -> Result<Code, JitError> {
+    generate(program, Defect::None, processor)
 }
 
 /// As [`compile`], with a deliberate mistake in the code.
 #[doc(hidden)]
 pub fn compile_with(program: &Program, defect: Defect) -> Result<Code, JitError> {
+    generate(program, defect, Processor::Host)
+}
+
+fn generate(program: &Program, defect: Defect, processor: Processor) -> Result<Code, JitError> {
     takt_ir::verify(program).map_err(JitError::Verify)?;
-    let isa = machine::host()?;
+    let isa = machine::isa(processor)?;
     let pool: Box<[u8]> = program.data.clone().into_boxed_slice();
     let families = program.families.clone().into_boxed_slice();
     let mut rows: Box<[usize]> = program.dispatch.iter().flat_map(|method| &method.targets).map(|_| 0).collect();

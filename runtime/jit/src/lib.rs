@@ -17,7 +17,8 @@ mod place;
 mod runtime;
 mod stack;
 
-pub use code::{Code, JitError, compile, compile_with};
+pub use code::{Code, JitError, compile, compile_for, compile_with};
 #[doc(hidden)]
 pub use defect::Defect;
+pub use machine::Processor;
 pub use stack::NATIVE_STACK;

@@ -26,8 +26,18 @@ pub(crate) struct Compiled {
     pub(crate) frame: usize,
 }
 
+/// Which instructions machine code may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Processor {
+    /// All of the processor we run on.
+    #[default]
+    Host,
+    /// Those that any processor of its architecture has: x86-64-v2 (no AVX, FMA, BMI), the base of aarch64. The results are the same, bit for bit.
+    Common,
+}
+
 /// The processor we run on, with our settings.
-pub(crate) fn host() -> Result<OwnedTargetIsa, JitError> {
+pub(crate) fn isa(processor: Processor) -> Result<OwnedTargetIsa, JitError> {
     let mut flags = settings::builder();
     let verifier = if cfg!(debug_assertions) { "true" } else { "false" };
     let wanted = [
@@ -44,7 +54,11 @@ pub(crate) fn host() -> Result<OwnedTargetIsa, JitError> {
     for (name, value) in wanted {
         flags.set(name, value).map_err(|e| JitError::Machine(e.to_string()))?;
     }
-    let builder = cranelift_native::builder().map_err(|e| JitError::Machine(e.to_string()))?;
+    let host = processor == Processor::Host;
+    let mut builder = cranelift_native::builder_with_options(host).map_err(|e| JitError::Machine(e.to_string()))?;
+    if !host && cfg!(target_arch = "x86_64") {
+        builder.enable("x86-64-v2").map_err(|e| JitError::Machine(e.to_string()))?;
+    }
     builder.finish(settings::Flags::new(flags)).map_err(|e| JitError::Machine(e.to_string()))
 }
 

@@ -366,8 +366,20 @@ struct ExplainArgs {
 pub enum EngineKind {
     /// Machine code.
     Jit,
+    /// Machine code without the newer instructions of the processor.
+    Portable,
     /// The reference interpreter.
     Interp,
+}
+
+impl From<EngineKind> for takt_engine::ExecutorKind {
+    fn from(kind: EngineKind) -> Self {
+        match kind {
+            EngineKind::Jit => Self::Jit,
+            EngineKind::Portable => Self::Portable,
+            EngineKind::Interp => Self::Interpreter,
+        }
+    }
 }
 
 /// How findings are shown.

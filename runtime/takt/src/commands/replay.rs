@@ -13,7 +13,7 @@ use crate::trace::{self, Trace};
 use crate::values;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use takt_engine::{Clock, ExecutorKind};
+use takt_engine::Clock;
 use takt_ir::Place;
 
 pub(super) fn execute(args: &ReplayArgs) -> Exit {
@@ -24,11 +24,7 @@ pub(super) fn execute(args: &ReplayArgs) -> Exit {
 
 /// How a player's machine is set up.
 pub(super) fn setup(engine: EngineKind, until: Option<String>) -> Setup {
-    let executor = match engine {
-        EngineKind::Jit => ExecutorKind::Jit,
-        EngineKind::Interp => ExecutorKind::Interpreter,
-    };
-    Setup { executor, clock: Clock::Virtual, until, native_stack: Some(crate::machine::NATIVE_STACK), ..Setup::default() }
+    Setup { executor: engine.into(), clock: Clock::Virtual, until, native_stack: Some(crate::machine::NATIVE_STACK), ..Setup::default() }
 }
 
 /// Says why a recording cannot be played.

@@ -3,7 +3,7 @@
 use super::keep::{self, Keep};
 use super::outputs::{Outputs, Writer, warning};
 use super::said::Teller;
-use super::{EngineKind, Exit, Format, RunArgs, Speed, check, summary};
+use super::{Exit, Format, RunArgs, Speed, check, summary};
 use crate::attached::{Attached, Places};
 use crate::clock::{self, Pace};
 use crate::console;
@@ -17,7 +17,7 @@ use crate::sources::Sources;
 use crate::{messages, platform, state};
 use std::path::PathBuf;
 use takt_abi::Time;
-use takt_engine::{Clock, ExecutorKind};
+use takt_engine::Clock;
 use takt_ir::Place;
 
 /// Why a run is over.
@@ -116,10 +116,7 @@ fn speed(args: &RunArgs, project: &Project) -> Speed {
 }
 
 fn build(args: &RunArgs, project: &Project, speed: Speed, keep: &Keep) -> Result<Machine, Exit> {
-    let executor = match args.engine {
-        EngineKind::Jit => ExecutorKind::Jit,
-        EngineKind::Interp => ExecutorKind::Interpreter,
-    };
+    let executor = args.engine.into();
     let clock = if speed == Speed::Factor(1.0) { Clock::Real(clock::machine_time) } else { Clock::Virtual };
     let setup = Setup {
         executor,

@@ -29,7 +29,11 @@ impl Machine {
             kind: "recording".into(),
             project: project.name.clone(),
             identity: Identity::of(project, &self.compiled, &self.program, size),
-            engine: if self.executor == ExecutorKind::Jit { "jit".into() } else { "interp".into() },
+            engine: match self.executor {
+                ExecutorKind::Jit => "jit".into(),
+                ExecutorKind::Portable => "portable".into(),
+                ExecutorKind::Interpreter => "interp".into(),
+            },
         };
         let plan = Plan { file, cores, header, sources: sources(project) };
         let mut room = Checkpoint::default();
