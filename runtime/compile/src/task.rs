@@ -25,6 +25,8 @@ pub(crate) struct Planned {
     trigger: Trigger,
     priority: u32,
     entry: BodyId,
+    /// `{attribute 'isolated'}`.
+    isolated: bool,
     span: Span,
 }
 
@@ -72,7 +74,7 @@ impl<'a> Compiler<'a> {
         };
         let span = self.pous[program].tree.name.span;
         let entry = self.entry("MainTask", &[(program, &[])], span);
-        vec![Planned { name: "MainTask".into(), trigger: Trigger::Cyclic(DEFAULT_PERIOD), priority: 1, entry, span }]
+        vec![Planned { name: "MainTask".into(), trigger: Trigger::Cyclic(DEFAULT_PERIOD), priority: 1, entry, isolated: false, span }]
     }
 
     fn configured_tasks(&mut self, configuration: &'a tree::Configuration) -> Vec<Planned> {
@@ -85,7 +87,8 @@ impl<'a> Compiler<'a> {
             let programs = self.programs_of(configuration, &task.name);
             let (trigger, priority) = self.task_arguments(task);
             let entry = self.entry(&task.name.text, &programs, task.name.span);
-            tasks.push(Planned { name: task.name.text.clone(), trigger, priority, entry, span: task.name.span });
+            let isolated = task.pragmas.iter().any(|pragma| pragma.name == "isolated");
+            tasks.push(Planned { name: task.name.text.clone(), trigger, priority, entry, isolated, span: task.name.span });
         }
         for program in &configuration.programs {
             let known = program.task.as_ref().is_some_and(|t| configuration.tasks.iter().any(|d| same(&d.name.text, &t.text)));
@@ -222,9 +225,9 @@ impl<'a> Compiler<'a> {
 
     /// Puts the stacks behind the variables and closes the image.
     pub(crate) fn finish_image(&mut self, tasks: Vec<Planned>) {
-        for Planned { name, trigger, priority, entry, span } in tasks {
+        for Planned { name, trigger, priority, entry, isolated, span } in tasks {
             let start = self.take(STACK, 16, span);
-            self.program.tasks.push(Task { name, trigger, priority, entry, stack: (start, STACK) });
+            self.program.tasks.push(Task { name, trigger, priority, entry, stack: (start, STACK), isolated });
         }
         if self.heap {
             let wanted = if self.options.heap == 0 { HEAP } else { self.options.heap };

@@ -10,14 +10,14 @@ use crate::engine::Engine;
 use crate::fault::RawFault;
 use crate::force::Forces;
 use crate::pack::Pack;
-use crate::schedule::TaskState;
+use crate::schedule::{Stopped, TaskState};
 use std::any::Any;
 use std::cell::OnceCell;
 use takt_abi::{Heap, Resources, Time};
 use takt_ir::Program;
 
 /// Says which layout follows.
-const LAYOUT: u32 = 1;
+const LAYOUT: u32 = 2;
 
 /// A state of an engine between two steps.
 #[derive(Default)]
@@ -102,8 +102,9 @@ struct SavedTask {
     overruns: u64,
     preempted: u64,
     fuel_max: u64,
+    stopped: Option<RawFault>,
 }
-crate::pack::pack_fields!(SavedTask { release, pending, level, step, next_preemption, cycles, overruns, preempted, fuel_max });
+crate::pack::pack_fields!(SavedTask { release, pending, level, step, next_preemption, cycles, overruns, preempted, fuel_max, stopped });
 
 impl SavedTask {
     fn of(task: &TaskState) -> Self {
@@ -126,6 +127,8 @@ impl SavedTask {
             granted: _,
             next_preemption,
             statistics,
+            isolated: _,
+            stopped,
         } = task;
         Self {
             release: *release,
@@ -137,11 +140,13 @@ impl SavedTask {
             overruns: statistics.overruns,
             preempted: statistics.preempted,
             fuel_max: statistics.fuel_max,
+            stopped: stopped.as_ref().map(|stopped| stopped.raw.clone()),
         }
     }
     fn put(&self, task: &mut TaskState) {
         (task.release, task.pending, task.level) = (self.release, self.pending, self.level);
         (task.step, task.next_preemption, task.running) = (self.step, self.next_preemption, false);
+        task.stopped = self.stopped.clone().map(|raw| Stopped { raw, record: OnceCell::new() });
         let statistics = &mut task.statistics;
         (statistics.cycles, statistics.overruns) = (self.cycles, self.overruns);
         (statistics.preempted, statistics.fuel_max) = (self.preempted, self.fuel_max);
@@ -210,7 +215,11 @@ impl Core {
         let mut next = |name| take_part(&mut from).map(|part| (name, part)).ok_or(CheckpointError::Part(name));
         let general = whole(next("bus")?, Pack::unpack)?;
         self.check_general(&general).ok_or(CheckpointError::Part("bus"))?;
-        let tasks = whole(next("tasks")?, |from| self.tasks.iter().map(|_| Pack::unpack(from)).collect::<Option<Vec<_>>>())?;
+        let tasks: Vec<SavedTask> = whole(next("tasks")?, |from| self.tasks.iter().map(|_| Pack::unpack(from)).collect())?;
+        let alone = |(task, saved): (&TaskState, &SavedTask)| saved.stopped.is_none() || task.isolated;
+        if !self.tasks.iter().zip(&tasks).all(alone) {
+            return Err(CheckpointError::Part("tasks"));
+        }
         let stage = whole(next("axes")?, |from| self.stage.restored(from))?;
         let forces = whole(next("forces")?, |from| Forces::restored(&self.program, from))?;
         let heap = self.program.heap().restored(next("heap")?.1).ok_or(CheckpointError::Part("heap"))?;

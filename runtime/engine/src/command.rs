@@ -37,6 +37,8 @@ pub enum Command {
     },
     /// Clears a fault and starts the program anew, with the retained values that this kind of restart keeps.
     Reset(Reset),
+    /// Lets a task go on that a fault of its own stopped alone, with the variables as they are.
+    ResetTask(u32),
     /// Stops the program as a fault does: axes are brought to rest, outputs go to their safe values.
     Halt,
 }
@@ -94,6 +96,8 @@ pub enum CommandError {
     Access(AccessError),
     /// The program cannot start: its initial values fault.
     Initial(Box<FaultRecord>),
+    /// There is no such task, or no fault has stopped it alone.
+    NotStopped,
 }
 
 impl std::fmt::Display for CommandError {
@@ -101,6 +105,7 @@ impl std::fmt::Display for CommandError {
         match self {
             Self::Access(error) => write!(f, "{error}"),
             Self::Initial(record) => write!(f, "the initial values fault: {record}"),
+            Self::NotStopped => write!(f, "no fault has stopped this task alone"),
         }
     }
 }
@@ -154,6 +159,11 @@ impl Engine {
             // The last one first: of two forces on the same bytes the older knows what was there.
             Command::ReleaseAll { restore } => while self.core.forces.release(None, self.core.image.bytes_mut(), *restore) {},
             Command::Reset(kind) => self.reset(*kind).map_err(CommandError::Initial)?,
+            Command::ResetTask(task) => {
+                let release = self.core.tasks[self.core.bus].release;
+                let stopped = self.core.tasks.get_mut(*task as usize).filter(|task| task.stopped.is_some());
+                stopped.ok_or(CommandError::NotStopped)?.go_on(release);
+            }
             Command::Halt => self.halt(),
         }
         Ok(())

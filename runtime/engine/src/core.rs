@@ -17,7 +17,7 @@ use crate::observe::Observer;
 use crate::options::{Clock, Preemption};
 use crate::replay::{Recorder, Script};
 use crate::retain::{Keeper, Reset, Restore};
-use crate::schedule::TaskState;
+use crate::schedule::{Stopped, TaskState};
 use crate::system::SystemInfo;
 use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -257,7 +257,7 @@ impl Core {
         }
     }
 
-    /// Runs the body of a task; a fault stops the application.
+    /// Runs the body of a task; a fault stops the application, or the task if it is isolated.
     fn run(&mut self, index: usize, now: Time) {
         let granted = self.grant(index, 0);
         let task = &mut self.tasks[index];
@@ -275,11 +275,20 @@ impl Core {
         }
     }
 
-    /// The first fault counts.
+    /// Stops the task if it is isolated and the fault is its own, else the application. The first fault counts.
     pub fn stop_application(&mut self, raw: RawFault) {
-        if self.fault.is_none() {
-            self.fault = Some(raw);
-            self.record = OnceCell::new();
+        if self.fault.is_some() {
+            return;
+        }
+        let own = raw.task.filter(|task| *task != self.bus && raw.fault != Fault::Stopped);
+        match own.and_then(|task| self.tasks.get_mut(task)).filter(|task| task.isolated) {
+            Some(task) => {
+                task.stopped.get_or_insert(Stopped { raw, record: OnceCell::new() });
+            }
+            None => {
+                self.fault = Some(raw);
+                self.record = OnceCell::new();
+            }
         }
     }
 

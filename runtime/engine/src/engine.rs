@@ -125,6 +125,12 @@ impl Engine {
         Some(self.core.record.get_or_init(|| raw.record(&self.core.program)))
     }
 
+    /// The fault that stopped a task alone ([`takt_ir::Task::isolated`]).
+    pub fn task_fault(&self, task: usize) -> Option<&FaultRecord> {
+        let stopped = self.core.tasks.get(task)?.stopped.as_ref()?;
+        Some(stopped.record.get_or_init(|| stopped.raw.record(&self.core.program)))
+    }
+
     /// The calls that were under way in a task of the interpreter when a fault ended its scan, the innermost first: body, number of the place
     /// where it was, its locals as words, offset of its frame. Empty under machine code, which keeps no locals.
     pub fn stopped_calls(&self, task: usize) -> Vec<(BodyId, u32, Vec<u64>, u64)> {
@@ -178,10 +184,7 @@ impl Engine {
         }
         core.stop.store(false, Ordering::Relaxed);
         let release = core.tasks[core.bus].release;
-        for task in &mut core.tasks {
-            task.release = release;
-            (task.watched.slow, task.watched.missed) = (0, 0);
-        }
+        core.tasks.iter_mut().for_each(|task| task.go_on(release));
         Ok(())
     }
 

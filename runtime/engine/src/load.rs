@@ -45,6 +45,11 @@ pub enum LoadError {
         /// Those that exist.
         known: Vec<String>,
     },
+    /// The task that owns the bus is isolated: without it there is no application.
+    IsolatedBus {
+        /// Its name.
+        name: String,
+    },
     /// The image does not fit in memory.
     Memory {
         /// Bytes asked for.
@@ -129,6 +134,9 @@ impl std::fmt::Display for LoadError {
             Self::BusTask { name, known } | Self::TaskLimits { name, known } => {
                 write!(f, "there is no task `{name}`; there are: {}", known.join(", "))
             }
+            Self::IsolatedBus { name } => {
+                write!(f, "the task `{name}` owns the bus, so its faults stop the application: take its {{attribute 'isolated'}} away")
+            }
             Self::Memory { size } => write!(f, "no memory for an image of {size} bytes"),
             Self::NativeStack { needed, given } => write!(
                 f,
@@ -150,6 +158,9 @@ impl std::error::Error for LoadError {}
 pub fn load(program: Arc<Program>, options: Options, driver: Box<dyn IoDriver>) -> Result<Engine, LoadError> {
     verify(&program).map_err(LoadError::Verify)?;
     let bus = bus_task(&program, options.bus_task.as_deref())?;
+    if program.tasks[bus].isolated {
+        return Err(LoadError::IsolatedBus { name: program.tasks[bus].name.clone() });
+    }
     check_axes(&program, &options, driver.size().drives)?;
     let links = links(&program, &options.wires, driver.as_ref())?;
     let executor = match options.executor {

@@ -5,9 +5,11 @@
 //! freewheeling task is released every millisecond in virtual time, where a scan takes none; under a real clock it starts again 1 ms after its scan
 //! ended, or, where tasks of lower priority wait, after as long as the scan took if that is longer: it leaves them half of the processor.
 
+use crate::fault::{FaultRecord, RawFault};
 use crate::limits::Watched;
 use crate::memory::{Lane, Pinned};
 use crate::statistics::TaskStatistics;
+use std::cell::OnceCell;
 use takt_abi::Time;
 use takt_ir::{BodyId, Program, Trigger};
 
@@ -40,6 +42,16 @@ pub(crate) struct TaskState {
     /// Index of the next preemption of this task in the sorted list.
     pub next_preemption: usize,
     pub statistics: TaskStatistics,
+    /// A fault stops this task alone: the program says so, and it does not own the bus.
+    pub isolated: bool,
+    /// The fault that stopped it alone.
+    pub stopped: Option<Stopped>,
+}
+
+/// A fault of an isolated task.
+pub(crate) struct Stopped {
+    pub raw: RawFault,
+    pub record: OnceCell<FaultRecord>,
 }
 
 impl TaskState {
@@ -66,17 +78,26 @@ impl TaskState {
             granted: 0,
             next_preemption: 0,
             statistics: TaskStatistics::default(),
+            isolated: task.isolated,
+            stopped: None,
         }
     }
     fn is_event(&self) -> bool {
         matches!(self.trigger, Trigger::Event(..))
     }
     pub fn due(&self, now: Time) -> bool {
-        !self.running && if self.is_event() { self.pending } else { self.release <= now }
+        !self.running && self.stopped.is_none() && if self.is_event() { self.pending } else { self.release <= now }
     }
     /// When it is due next, if time alone makes it so.
     pub fn next_release(&self) -> Option<Time> {
-        if self.is_event() { self.pending.then_some(self.release) } else { Some(self.release) }
+        let waits = self.stopped.is_none() && (self.pending || !self.is_event());
+        waits.then_some(self.release)
+    }
+    /// The task goes on after a fault of its own, from the release at `now` on.
+    pub fn go_on(&mut self, now: Time) {
+        self.stopped = None;
+        (self.release, self.pending) = (now, false);
+        (self.watched.slow, self.watched.missed) = (0, 0);
     }
     /// A scan starts at `now`: sets the next release behind it and counts those that were missed.
     pub fn start(&mut self, now: Time) {

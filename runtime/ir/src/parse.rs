@@ -216,7 +216,8 @@ fn task(cursor: &mut Cursor<'_>) -> Result<Task, ParseError> {
     cursor.expect("entry")?;
     let entry = BodyId(cursor.number()?);
     cursor.expect("stack")?;
-    Ok(Task { name, trigger, priority, entry, stack: (cursor.number()?, cursor.number()?) })
+    let stack = (cursor.number()?, cursor.number()?);
+    Ok(Task { name, trigger, priority, entry, stack, isolated: cursor.accept("isolated") })
 }
 
 /// The table of sites of a text that has none: as many as are used, at the most so many that a mistyped number does no harm.

@@ -119,7 +119,8 @@ impl Printer<'_> {
                 Trigger::Event(offset, Some(bit)) => write!(out, "event {offset} bit {bit}")?,
                 Trigger::Freewheeling => write!(out, "freewheeling")?,
             }
-            writeln!(out, " priority {} entry {} stack {} {}", task.priority, task.entry.0, task.stack.0, task.stack.1)?;
+            write!(out, " priority {} entry {} stack {} {}", task.priority, task.entry.0, task.stack.0, task.stack.1)?;
+            writeln!(out, "{}", if task.isolated { " isolated" } else { "" })?;
         }
         if let Some(body) = program.init_body {
             writeln!(out, "start {}", body.0)?;

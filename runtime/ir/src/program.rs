@@ -56,6 +56,8 @@ pub struct Task {
     pub entry: BodyId,
     /// The task's own stack region: first byte and bytes.
     pub stack: (u32, u32),
+    /// A fault stops this task alone, not the application.
+    pub isolated: bool,
 }
 
 /// A variable that can be named from outside: a global (`GVL.x`, plain `x`) or a program instance.

@@ -2,7 +2,7 @@
 
 use crate::body::Tables;
 use crate::defect::Defect;
-use crate::machine::{self, Compiled};
+use crate::machine::{self, Compiled, Processor};
 use crate::stack::StackUse;
 use cranelift_codegen::ir::{LibCall, Signature};
 use cranelift_jit::{ArenaMemoryProvider, JITBuilder, JITModule};

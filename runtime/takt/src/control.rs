@@ -108,7 +108,7 @@ impl Control {
     #[cfg(unix)]
     pub fn open(path: PathBuf, about: About, journal: Option<Poster>, stop: StopHandle) -> Result<(Self, Port), ControlError> {
         let listener = socket::bind(&path).map_err(|message| ControlError { path: path.clone(), message })?;
-        let (port, line) = port::pair();
+        let (port, line) = port::pair(about.program.tasks.len());
         let end = Arc::new(AtomicBool::new(false));
         let defect = journal.clone();
         let mut server = server::Server::new(listener, about, line, journal, end.clone());

@@ -52,6 +52,7 @@ words! {
     RealTimeFactor "times real time" "倍实时",
     Overruns "Overruns" "超时",
     Fault "Fault" "故障",
+    TaskStopped "a fault has stopped a task alone" "故障使一个任务单独停止",
     NoFault "none" "无",
     Demonstration "A demonstration: as fast as possible. Watch it in real time with `--speed real`." "演示:以最快速度运行。用 `--speed real` 可实时观看。",
     Stopped "Stopped on request." "已按请求停止。",

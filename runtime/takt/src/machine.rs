@@ -254,6 +254,11 @@ impl Machine {
         self.engine.force_count()
     }
 
+    /// The faults that stopped isolated tasks alone.
+    pub fn task_faults(&self) -> impl Iterator<Item = &FaultRecord> {
+        (0..self.program.tasks.len()).filter_map(|task| self.engine.task_fault(task))
+    }
+
     /// The fault that stopped the program.
     pub fn fault(&self) -> Option<&FaultRecord> {
         self.engine.fault()

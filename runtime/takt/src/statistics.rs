@@ -6,14 +6,10 @@ use serde_json::{Value, json};
 use takt_engine::{Engine, FaultRecord, TaskStatistics};
 use takt_ir::{Program, Task, Trigger};
 
-/// What a task is doing: `running`; `fault` where it stopped the application; `stopped` where another did, or somebody.
-pub fn state(engine: &Engine, task: &Task) -> &'static str {
-    state_with(engine.fault(), task)
-}
-
-/// The same, of the fault that stopped the application.
-pub fn state_with(fault: Option<&FaultRecord>, task: &Task) -> &'static str {
+/// What a task is doing: `running`; `fault` where a fault of its own stopped it or the application; `stopped` where another task did, or somebody.
+fn state(fault: Option<&FaultRecord>, own: Option<&FaultRecord>, task: &Task) -> &'static str {
     match fault {
+        None if own.is_some() => "fault",
         None => "running",
         Some(record) if record.fault != takt_abi::Fault::Stopped && record.task == task.name => "fault",
         Some(_) => "stopped",
@@ -31,15 +27,15 @@ fn trigger(task: &Task) -> (&'static str, Option<i64>) {
 /// All tasks, in the order of the program. Times are nanoseconds.
 pub fn to_json(program: &Program, engine: &Engine) -> Value {
     let tasks = program.tasks.iter().enumerate();
-    tasks.map(|(i, task)| task_to_json(task, state(engine, task), engine.statistics(i))).collect()
+    tasks.map(|(i, task)| task_to_json(task, engine.fault(), engine.task_fault(i), engine.statistics(i))).collect()
 }
 
-/// One task.
-pub fn task_to_json(task: &Task, state: &str, statistics: &TaskStatistics) -> Value {
+/// One task, with the fault that stopped the application and the one that stopped the task alone.
+pub fn task_to_json(task: &Task, fault: Option<&FaultRecord>, own: Option<&FaultRecord>, statistics: &TaskStatistics) -> Value {
     let TaskStatistics { cycles, overruns, preempted, fuel_max, scan_ns, jitter_ns } = statistics;
     let (kind, interval) = trigger(task);
     json!({
-        "name": task.name, "state": state, "kind": kind, "interval_ns": interval, "priority": task.priority,
+        "name": task.name, "state": state(fault, own, task), "fault": own.map(ToString::to_string), "kind": kind, "interval_ns": interval, "priority": task.priority,
         "cycles": cycles, "overruns": overruns, "preempted": preempted, "fuel_max": fuel_max,
         "scan_ns": {
             "last": scan_ns.last(), "mean": scan_ns.mean().round() as u64, "min": scan_ns.min(), "max": scan_ns.max(),
@@ -72,7 +68,7 @@ pub fn to_csv(program: &Program, engine: &Engine) -> String {
             jitter.max(),
         ];
         let interval = interval.map_or_else(String::new, |ns| ns.to_string());
-        text.push_str(&format!("{name},{},{kind},{interval},{}", state(engine, task), task.priority));
+        text.push_str(&format!("{name},{},{kind},{interval},{}", state(engine.fault(), engine.task_fault(i), task), task.priority));
         numbers.iter().for_each(|number| text.push_str(&format!(",{number}")));
         text.push('\n');
     }

@@ -216,7 +216,14 @@ impl Writer {
 /// A program of these bodies; the first one is the task.
 pub fn program(bodies: Vec<Body>, natives: Vec<Native>, sites: u32) -> Program {
     let init = (0..1024u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
-    let task = Task { name: "main".into(), trigger: Trigger::Cyclic(1_000_000), priority: 0, entry: BodyId(0), stack: (STACK, 1024) };
+    let task = Task {
+        name: "main".into(),
+        trigger: Trigger::Cyclic(1_000_000),
+        priority: 0,
+        entry: BodyId(0),
+        stack: (STACK, 1024),
+        isolated: false,
+    };
     Program {
         bodies,
         natives,

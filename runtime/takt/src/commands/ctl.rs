@@ -88,6 +88,11 @@ enum Verb {
         #[arg(value_name = "KIND", default_value = "warm")]
         kind: ResetKind,
     },
+    /// Lets an isolated task go on that a fault has stopped alone.
+    ResetTask {
+        #[arg(value_name = "TASK")]
+        task: String,
+    },
     /// Starts the statistics of the tasks anew.
     ResetStatistics,
     /// Stands still between two scans.
@@ -143,6 +148,7 @@ impl Verb {
                 ("subscribe", arguments, false)
             }
             Self::Reset { kind } => ("reset", json!({ "kind": format!("{kind:?}").to_lowercase() }), true),
+            Self::ResetTask { task } => ("reset-task", json!({ "task": task }), true),
             Self::ResetStatistics => ("reset-statistics", json!({}), true),
             Self::Pause => ("pause", json!({}), true),
             Self::Continue => ("continue", json!({}), true),

@@ -101,7 +101,8 @@ fn try_run(args: &RunArgs) -> Result<Exit, Exit> {
         summary::tell_tasks(&mut machine);
     }
     tell_recording(args, recorded.as_ref());
-    let bad = matches!(over, Over::End(End::Fault | End::TimedOut { .. } | End::Condition { .. }));
+    let bad =
+        matches!(over, Over::End(End::Fault | End::TimedOut { .. } | End::Condition { .. })) || machine.task_faults().next().is_some();
     Ok(if bad { Exit::Findings } else { Exit::Good })
 }
 

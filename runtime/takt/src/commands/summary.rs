@@ -107,6 +107,9 @@ pub(super) fn tell(project: &Project, machine: &Machine, over: &Over, wall: Opti
     if let (Over::End(End::Fault), Some(record)) = (over, machine.fault()) {
         console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}", Word::Fault.text(language)));
     }
+    for record in machine.task_faults() {
+        console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}", Word::TaskStopped.text(language)));
+    }
     let Some(wall) = wall else { return };
     let rows = rows(machine, over, wall, language);
     let wide = rows.iter().map(|(label, _)| cells(label)).max().unwrap_or(0);

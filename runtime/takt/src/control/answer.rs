@@ -85,8 +85,11 @@ pub(super) fn mode(mode: Mode) -> &'static str {
 
 /// The tasks of a program and what is known of their scans.
 pub(super) fn tasks(program: &Program, status: &Status) -> Value {
-    let tasks = program.tasks.iter().zip(&status.tasks);
-    tasks.map(|(task, of)| statistics::task_to_json(task, statistics::state_with(status.fault.as_deref(), task), of)).collect()
+    let tasks = program.tasks.iter().zip(&status.tasks).zip(&status.stopped);
+    let line = |((task, of), own): ((&takt_ir::Task, &takt_engine::TaskStatistics), &Option<std::sync::Arc<takt_engine::FaultRecord>>)| {
+        statistics::task_to_json(task, status.fault.as_deref(), own.as_deref(), of)
+    };
+    tasks.map(line).collect()
 }
 
 /// What stopped the program; null if nothing did.

@@ -81,6 +81,7 @@ impl Server {
             Request::Subscribe { variables, period_ms, scans } => self.subscribe(client, id, &variables, period_ms, scans),
             Request::Unsubscribe { subscription } => self.unsubscribe(client, id, subscription),
             Request::Reset { kind } => self.reset(client, id, kind),
+            Request::ResetTask { task } => self.reset_task(client, id, &task),
             Request::Halt {} => {
                 self.command(client, id, Event::Control, vec![], vec![Command::Halt], None);
                 Ok(())
@@ -281,6 +282,16 @@ impl Server {
         Ok(())
     }
 
+    fn reset_task(&mut self, client: u64, id: &Value, name: &str) -> Result<(), Problem> {
+        let tasks = &self.about.program.tasks;
+        let Some(task) = tasks.iter().position(|task| task.name.eq_ignore_ascii_case(name)) else {
+            let known = tasks.iter().map(|task| task.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(Problem::new("unknown-task", format!("there is no task `{name}`")).expected(known));
+        };
+        self.command(client, id, Event::Reset, vec![], vec![Command::ResetTask(task as u32)], None);
+        Ok(())
+    }
+
     fn change(&mut self, client: u64, id: &Value, change: Change) -> Result<(), Problem> {
         let work = Work::Run { change, before: super::job::Mode::Running };
         self.demand(client, id, work, Kind::Run(change));
@@ -453,6 +464,10 @@ impl Server {
                     self.post(entry().variable("all").message(if *restore { "restored" } else { "kept" }));
                 }
                 (Command::Reset(kind), _) => self.post(entry().message(format!("{kind:?}").to_lowercase())),
+                (Command::ResetTask(task), _) => {
+                    let name = self.about.program.tasks.get(*task as usize).map_or("?", |task| &task.name);
+                    self.post(entry().message(format!("task {name}")));
+                }
                 (Command::Halt, _) => self.post(entry().message("halt")),
                 (_, Some(target)) => {
                     let [old, new] = [&item.old, &item.new].map(|bytes| Some(self.text(target.place.ty, bytes)));

@@ -135,6 +135,8 @@ pub struct Status {
     pub mode: Mode,
     /// The fault that stopped the program.
     pub fault: Option<Arc<FaultRecord>>,
+    /// Per task, the fault that stopped it alone.
+    pub stopped: Vec<Option<Arc<FaultRecord>>>,
     /// Why the last exchange failed.
     pub io_fault: Option<IoFault>,
     /// How many failed.
@@ -154,6 +156,7 @@ impl Status {
             tasks: vec![TaskStatistics::default(); tasks],
             mode: Mode::Running,
             fault: None,
+            stopped: vec![None; tasks],
             io_fault: None,
             io_faults: 0,
             at_rest: false,

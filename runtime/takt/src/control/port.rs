@@ -25,6 +25,8 @@ pub struct Port {
     end: bool,
     /// Kept so that telling of a fault allocates nothing.
     fault: Option<Arc<FaultRecord>>,
+    /// The same of tasks that were stopped alone.
+    stopped: Vec<Option<Arc<FaultRecord>>>,
     #[allow(clippy::vec_box, reason = "the boxes come from the server, which frees them; unpacking one here would free it")]
     samplers: Vec<Box<Sampler>>,
 }
@@ -37,7 +39,7 @@ pub(super) struct Line {
 }
 
 /// Both ends.
-pub(super) fn pair() -> (Port, Line) {
+pub(super) fn pair(tasks: usize) -> (Port, Line) {
     let (jobs, to_port) = rtrb::RingBuffer::new(JOBS);
     let (from_port, done) = rtrb::RingBuffer::new(2 * JOBS);
     let port = Port {
@@ -46,6 +48,7 @@ pub(super) fn pair() -> (Port, Line) {
         mode: Mode::Running,
         end: false,
         fault: None,
+        stopped: vec![None; tasks],
         samplers: Vec::with_capacity(limits::SAMPLERS),
     };
     (port, Line { jobs, done })
@@ -99,6 +102,13 @@ impl Port {
             (Some(record), None) => self.fault = Some(Arc::new(record.clone())),
             _ => {}
         }
+        for (task, kept) in self.stopped.iter_mut().enumerate() {
+            match (engine.task_fault(task), &kept) {
+                (None, Some(_)) => *kept = None,
+                (Some(record), None) => *kept = Some(Arc::new(record.clone())),
+                _ => {}
+            }
+        }
     }
 
     fn work(&mut self, job: &mut Job, engine: &mut Engine) -> usize {
@@ -139,6 +149,7 @@ impl Port {
         }
         status.mode = self.mode;
         status.fault.clone_from(&self.fault);
+        status.stopped.clone_from_slice(&self.stopped);
         (status.io_fault, status.io_faults) = engine.io_faults();
         status.at_rest = engine.at_rest();
         for force in engine.forces() {

@@ -84,6 +84,9 @@ pub(super) enum Request {
         #[serde(default)]
         kind: Kind,
     },
+    ResetTask {
+        task: String,
+    },
     ResetStatistics {},
     Halt {},
     Pause {},
@@ -106,6 +109,7 @@ impl Request {
                 | Release { .. }
                 | ReleaseAll { .. }
                 | Reset { .. }
+                | ResetTask { .. }
                 | ResetStatistics {}
                 | Halt {}
                 | Pause {}

@@ -36,12 +36,16 @@ pub struct Monitor {
     io: Told,
     io_bad: bool,
     faulted: bool,
+    /// Tasks that were stopped alone.
+    stopped: Vec<bool>,
 }
 
 impl Monitor {
     /// For an engine.
     pub fn new(poster: ScanPoster, engine: &Engine) -> Self {
-        Self { poster, overruns: vec![Told::NOTHING; engine.program().tasks.len()], io: Told::NOTHING, io_bad: false, faulted: false }
+        let tasks = engine.program().tasks.len();
+        let overruns = vec![Told::NOTHING; tasks];
+        Self { poster, overruns, io: Told::NOTHING, io_bad: false, faulted: false, stopped: vec![false; tasks] }
     }
 
     /// After a step.
@@ -58,6 +62,13 @@ impl Monitor {
             self.poster.post(Notice::Fault(Box::new(record.clone())));
         }
         self.faulted = fault.is_some();
+        for (task, stopped) in self.stopped.iter_mut().enumerate() {
+            let fault = engine.task_fault(task);
+            if let (false, Some(record)) = (*stopped, fault) {
+                self.poster.post(Notice::Fault(Box::new(record.clone())));
+            }
+            *stopped = fault.is_some();
+        }
     }
 
     fn look_at_bus(&mut self, engine: &Engine, time: Time) {

@@ -180,6 +180,10 @@ impl Encoder {
             Command::ReleaseAll { restore } => out.extend_from_slice(&[3, (*restore).into()]),
             Command::Reset(kind) => out.extend_from_slice(&[4, reset_number(*kind)]),
             Command::Halt => out.push(5),
+            Command::ResetTask(task) => {
+                out.push(6);
+                put(out, (*task).into());
+            }
         }
     }
     /// The host answered.
@@ -428,6 +432,7 @@ impl<'a> Reader<'a> {
             3 => Command::ReleaseAll { restore: self.flag("0 or 1")? },
             4 => Command::Reset(self.reset()?),
             5 => Command::Halt,
+            6 => Command::ResetTask(self.small("a task")?),
             _ => return self.fail("a command that this version knows"),
         })
     }

@@ -49,12 +49,13 @@ fn inputs(random: &mut Random, io: &mut ProcessImage) {
 fn command(random: &mut Random) -> Command {
     let place = Place { offset: random.next() as u32, ty: TypeId(random.below(100) as u32) };
     let bytes = vec![random.next() as u8; random.below(20) as usize].into_boxed_slice();
-    match random.below(6) {
+    match random.below(7) {
         0 => Command::Write { place, bytes },
         1 => Command::Force { place, bytes },
         2 => Command::Release { place, restore: random.below(2) == 0 },
         3 => Command::ReleaseAll { restore: true },
         4 => Command::Reset(Reset::Cold),
+        5 => Command::ResetTask(random.below(3) as u32),
         _ => Command::Halt,
     }
 }
