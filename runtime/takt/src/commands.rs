@@ -36,7 +36,7 @@ pub enum Exit {
 
 /// Takt: an IEC 61131-3 Structured Text runtime for machines that move.
 #[derive(Debug, Parser)]
-#[command(name = "takt", version, about, long_about = None)]
+#[command(name = "takt", version, long_about = None)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,

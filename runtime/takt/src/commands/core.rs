@@ -115,7 +115,9 @@ fn tell(core: &Postmortem) {
         variables(Word::Locals.text(language), &call.locals);
         variables(Word::Members.text(language), &call.members);
     }
-    console::result(format_args!("\n{}", Word::LastInputs.text(language)));
+    if !core.inputs.is_empty() {
+        console::result(format_args!("\n{}", Word::LastInputs.text(language)));
+    }
     core.inputs.iter().for_each(|(name, value)| console::result(format_args!("  {name} = {value}")));
 }
 

@@ -172,7 +172,7 @@ fn tell(machine: &mut Machine, played: u64, factor: f64, cut: bool) {
     if cut {
         console::tell(Word::RecordingCut.text(language));
     }
-    if let Some(record) = machine.fault() {
+    if let Some(record) = machine.fault().filter(|record| record.fault != takt_abi::Fault::Stopped) {
         console::tell(format_args!("\x1b[1;31m{}\x1b[0m: {record}", Word::Fault.text(language)));
     }
 }

@@ -208,7 +208,7 @@ mod tests {
         let none = json!({ "last": 0, "mean": 0, "min": 0, "max": 0, "p50": 0, "p99": 0 });
         let name = &machine.program().tasks[0].name;
         let task = json!({
-            "name": name, "state": "running", "kind": "cyclic", "interval_ns": 10_000_000, "priority": json["tasks"][0]["priority"], "cycles": 3,
+            "name": name, "state": "running", "fault": null, "kind": "cyclic", "interval_ns": 10_000_000, "priority": json["tasks"][0]["priority"], "cycles": 3,
             "overruns": 0, "preempted": 0, "fuel_max": 0, "scan_ns": none, "jitter_ns": { "p50": 0, "p99": 0, "max": 0 },
         });
         let expected = json!({

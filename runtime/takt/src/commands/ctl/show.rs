@@ -103,8 +103,12 @@ fn tasks(tasks: &Value) {
             text(&task["overruns"]),
         ]
     };
-    let rows: Vec<_> = std::iter::once(head).chain(tasks.as_array().into_iter().flatten().map(row)).collect();
+    let tasks: Vec<&Value> = tasks.as_array().into_iter().flatten().collect();
+    let rows: Vec<_> = std::iter::once(head).chain(tasks.iter().copied().map(row)).collect();
     table(&rows);
+    for fault in tasks.iter().filter_map(|task| task["fault"].as_str()) {
+        console::result(format_args!("\x1b[1;31m  {}\x1b[0m: {fault}", Word::TaskStopped.text(language::of_environment())));
+    }
 }
 
 /// The forces; false if there are none.
