@@ -27,6 +27,7 @@ macro_rules! words {
     ($($name:ident $english:literal $chinese:literal,)*) => {
         /// What the tool says of itself.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[allow(rustdoc::broken_intra_doc_links, reason = "sections of the manifest in brackets are no links")]
         pub enum Word { $(#[doc = $english] $name,)* }
         impl Word {
             /// The text.
